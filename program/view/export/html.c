@@ -29,6 +29,7 @@ typedef struct page {
   double position_step;      /* quantisation step of positions, mm */
   double coefficient_step;   /* quantisation step of the surface's displacements by modes, mm */
   double inside_step;        /* the same for structures inside the lungs, mm */
+  supine_target *targets;    /* the structures inside the lungs, before they move; or NULL */
   export_order order;        /* order of stored vertices and triangles of the surface */
   json_t *tensors; /* list of objects {name, base64} for the tag {{tensors}} of page.html */
   supine_arena arena;
@@ -200,6 +201,13 @@ static json_t *begins(const supine_basis_info *info, const size_t *begin) {
   return list;
 }
 
+/* Find which structures inside the lungs are anatomy. */
+static supine_status find_inside(page *p, supine_error *error) {
+  const supine_pose *const pose[2] = {&p->shown->from[0].pose, &p->shown->from[0].pose};
+  return supine_options_targets_find(p->shown->inside, p->shown->names, pose, NULL, false,
+                                     &p->targets, error);
+}
+
 /* Describe the structures inside the lungs as JSON: sizes, names and quantisation step. */
 static json_t *describe_inside(const page *p) {
   const supine_basis_info *info = p->inside;
@@ -207,8 +215,12 @@ static json_t *describe_inside(const page *p) {
     return json_null();
   }
   json_t *names = json_array();
+  json_t *anatomy = json_array();
   for (size_t i = 0; i < p->shown->names->count; ++i) {
     (void)json_array_append_new(names, supine_options_json_text(p->shown->names->text[i]));
+    if (p->targets[i].anatomy) {
+      (void)json_array_append_new(anatomy, json_integer((json_int_t)i));
+    }
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside, "rigid");
   json_t *parts = json_array();
@@ -218,10 +230,10 @@ static json_t *describe_inside(const page *p) {
       (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->names->part[first]));
     }
   }
-  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:f}", "vertices", (json_int_t)info->vertex_count,
-                   "triangles", (json_int_t)info->triangle_count, "lungBegin",
-                   begins(info, info->lung_begin), "names", names, "rigid", parts, "unit",
-                   p->inside_step);
+  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:o, s:f}", "vertices",
+                   (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
+                   "lungBegin", begins(info, info->lung_begin), "names", names, "anatomy", anatomy,
+                   "rigid", parts, "unit", p->inside_step);
 }
 
 /* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose
@@ -315,6 +327,7 @@ static supine_status find_coefficients(page *p, supine_error *error) {
 
 static void free_page(page *p) {
   json_decref(p->tensors);
+  supine_options_targets_free(&p->targets);
   supine_arena_free(&p->arena);
 }
 
@@ -337,6 +350,9 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
       "with 'supine render', or export the surface of one state with 'supine deform'");
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_TRY(find_coefficients(&p, error));
+  if (p.inside != NULL) {
+    SUPINE_TRY(find_inside(&p, error));
+  }
   SUPINE_TRY(supine_export_order_make(p.info, true, &p.arena, &p.order, error));
   find_steps(&p);
   if (add_tensors(&p) != SUPINE_OK) {
