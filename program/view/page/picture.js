@@ -665,14 +665,8 @@ class Picture {
       if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
     });
     if (pane.inside) {
-      gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that translucent lungs hide nothing inside them
-      gl.colorMask(false, false, false, false);
-      pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
-      gl.colorMask(true, true, true, true);
-      this.usePane(this.contentPicker, pane, [x, y, pane.box[2], pane.box[3]]);
-      for (const which of [...this.basis.inside.shells, 'dots']) this.drawInside(this.contentPicker, pane, DOT_RADIUS, which);
-      gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that anatomy hides no target inside it
-      this.drawInside(this.contentPicker, pane, Math.max(BALL_RADIUS, 8 * pane.pixel), null);
+      this.pickInside(pane, x, y, [...this.basis.inside.shells, 'dots'], DOT_RADIUS);
+      this.pickInside(pane, x, y, [null], Math.max(BALL_RADIUS, 8 * pane.pixel)); // anatomy hides no target inside it
     }
     gl.bindVertexArray(null);
     this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a new buffer, because reading into the old one would wait
@@ -681,6 +675,22 @@ class Picture {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     this.picking = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
+  }
+
+  /** Draw structures inside the lungs to the image of pick(), where opaque lungs do not hide them. `which` lists what
+   * drawInside takes. */
+  pickInside(pane, x, y, which, radius) {
+    const { gl } = this;
+    const lens = [x, y, pane.box[2], pane.box[3]];
+    gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that translucent lungs, and structures drawn before, hide nothing
+    this.usePane(this.picker, pane, lens);
+    gl.bindVertexArray(this.shown(pane.state, pane.origin));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+    gl.colorMask(false, false, false, false);
+    pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
+    gl.colorMask(true, true, true, true);
+    this.usePane(this.contentPicker, pane, lens);
+    for (const each of which) this.drawInside(this.contentPicker, pane, radius, each);
   }
 
   /** Return the point that pick() requested: null if nothing is seen there, undefined if the graphics card has not
