@@ -65,7 +65,7 @@ const findings = await page.evaluate(() => [...document.querySelectorAll('.findi
 assert.equal(findings.length, 3);
 assert.match(findings[2], /^With gravity|^Lying on the left side, (nodule|mark) moves [\d.]+ mm/);
 /* The matrix has the numbers of --json: a row for each target, and a column for each posture but the reference. */
-const matrix = await page.evaluate(() => [...document.querySelectorAll('table.matrix')].map((table) => ({ heads: [...table.tHead.rows[0].cells].slice(1).map((cell) => cell.textContent), rows: [...table.tBodies[0].rows].map((row) => ({ name: row.cells[0].textContent, cells: [...row.cells].slice(1).map((cell) => [cell.firstChild.textContent, cell.lastChild.textContent]) })) })));
+const matrix = await page.evaluate(() => [...document.querySelectorAll('table.matrix')].map((table) => ({ heads: [...table.tHead.rows[0].cells].slice(1).map((cell) => cell.textContent), rows: [...table.tBodies[0].rows].map((row) => ({ name: row.cells[0].textContent, cells: [...row.cells].slice(1).map((cell) => [cell.firstChild.textContent.trim(), cell.lastChild.textContent]) })) })));
 const moved = json.postures; // at rest + 120 mL, supine has moved too
 assert.deepEqual(matrix.flatMap(({ heads }) => heads), summary.map(([name]) => name));
 assert.ok(matrix.every(({ heads }) => heads.length <= 4));

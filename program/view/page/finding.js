@@ -41,7 +41,8 @@ function distancesOf(basis, after, before) {
 }
 
 /** Return, for each lung and axis, the sums over its vertices of the products of their displacements by two modes at
- * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. */
+ * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. The page of a
+ * simplified surface has those of the whole one. */
 function squaresOf(basis) {
   const { modes, vertices } = basis;
   const sums = new Float64Array(basis.lungs * 3 * modes * modes);
@@ -60,7 +61,7 @@ function squaresOf(basis) {
 /** Return the RMS over the vertices of the surface of their distance between two states of the lungs, mm, without a pass
  * over the vertices. */
 function rmsBetween(basis, now, from) {
-  basis.squares ??= squaresOf(basis);
+  basis.squares ??= basis.wholeVertices > basis.vertices ? takeTensor('squares', Float64Array) : squaresOf(basis);
   const { modes, squares } = basis;
   let sum = 0;
   for (let row = 0, at = 0; row < 3 * basis.lungs; ++row) {

@@ -816,7 +816,7 @@ const errorOf = ({ metadata, fields }) => metadata.error_rms_percent && `${Numbe
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [
-    ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices`],
+    ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices${basis.wholeVertices > basis.vertices ? ` of ${basis.wholeVertices.toLocaleString('en')}` : ''}`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
     ['error', errorOf(basis)],
     ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
