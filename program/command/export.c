@@ -41,7 +41,7 @@ static const supine_option table[] = {
     {"simplify", 0, "N",
      "keep about N vertices, each with its own displacement, and span new triangles between them, "
      "for a smaller and faster file; the output says how far the new surface is from the whole one",
-     SUPINE_FILLS(request, simplify), .range = {100, UINT32_MAX}},
+     SUPINE_FILLS(request, simplify), .range = {8, UINT32_MAX}},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "

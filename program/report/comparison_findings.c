@@ -53,7 +53,10 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
 static size_t find_first(const supine_comparison *c) {
   size_t first = 0;
   double most = -1.0;
-  for (size_t i = 0; i < c->postures.count && c->inside != NULL; ++i) {
+  if (c->inside == NULL) {
+    return 0;
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
     const size_t k = supine_options_targets_first(c->posture[i].targets, c->names.count);
     const supine_target *t = &c->posture[i].targets[k];
     const double ratio = t->expected > 0.0 ? t->moved / t->expected : t->moved;
@@ -113,8 +116,10 @@ json_t *supine_report_findings(const supine_comparison *c) {
 
 /* Return the mark of the footnote on a value of a posture, or NULL. */
 static const char *mark_of(const supine_comparison *c, size_t posture, const char *of) {
-  const bool breath = c->posture[posture].has_breath || strcmp(of, "ratio") != 0;
-  for (size_t j = 0; breath && j < sizeof published / sizeof *published; ++j) {
+  if (strcmp(of, "ratio") == 0 && !c->posture[posture].has_breath) {
+    return NULL;
+  }
+  for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
     if (strcmp(published[j].of, of) == 0 &&
         strcmp(published[j].posture, c->posture[posture].item->name) == 0) {
       return published[j].mark;

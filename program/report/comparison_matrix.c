@@ -10,6 +10,7 @@ enum { POSTURES_MAX = 4 }; /* columns of a table, besides the names */
 
 /* Return the cell of a target: its displacement and error, and its directions below. */
 static json_t *target_cell(const supine_target *t) {
+  SUPINE_C_LOCALE;
   const bool told = isnan(t->expected) || t->moved > t->expected;
   char way[96];
   json_t *size = isnan(t->expected) ? json_sprintf("%.1f", t->moved)
@@ -22,6 +23,7 @@ static json_t *target_cell(const supine_target *t) {
 /* Return the cell of a lobe or another large structure: the change of its volume if it is closed,
  * and its displacement. */
 static json_t *anatomy_cell(const supine_target *t) {
+  SUPINE_C_LOCALE;
   if (!(t->volume[0] > 0.0) || isnan(t->volume[1])) {
     return target_cell(t);
   }

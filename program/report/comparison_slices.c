@@ -190,7 +190,10 @@ json_t *supine_report_outlines(const supine_comparison *c) {
     return list;
   }
   double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
-  for (size_t i = 0; area != NULL && i < sizeof slices / sizeof *slices; ++i) {
+  if (area == NULL) {
+    return list;
+  }
+  for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
     const slice *s = &slices[i];
     double before = 0.0;
     const double at = of.low[s->axis] + s->share * (of.high[s->axis] - of.low[s->axis]);
@@ -246,10 +249,15 @@ json_t *supine_report_target_outlines(const supine_comparison *c) {
   SUPINE_C_LOCALE;
   SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
   size_t left_out = 0;
+  if (!find_shapes(c, &of)) {
+    return NULL;
+  }
+  double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
+  if (area == NULL) {
+    return NULL;
+  }
   json_t *list = json_array();
-  const bool found = find_shapes(c, &of);
-  double *area = found ? supine_arena_zeros(&of.arena, c->postures.count, sizeof *area) : NULL;
-  for (size_t k = 0; area != NULL && k < c->names.count; ++k) {
+  for (size_t k = 0; k < c->names.count; ++k) {
     const bool drawn =
         !c->posture[0].targets[k].anatomy && c->names.begin[k + 1] > c->names.begin[k];
     if (drawn && json_array_size(list) < TARGETS_MAX) {

@@ -67,8 +67,11 @@ static void add_lungs(const supine_comparison *c, size_t posture, FILE *file) {
     hilum.error = p->hilum.expected;
     add_row(c, posture, &hilum, file);
   }
+  if (info->is_fields) { /* they have no volumes */
+    return;
+  }
   (void)supine_basis_volumes(c->basis, &c->reference.pose, before);
-  for (size_t lung = 0; lung < info->lung_count && !info->is_fields; ++lung) {
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
     row of = none;
     of.kind = "lung";
     of.name = info->lung_names[lung];

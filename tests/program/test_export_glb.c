@@ -177,9 +177,9 @@ TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
 }
 
 TEST(test_glb_simplified_morphs_to_positions_of_library) {
-  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain", "--simplify", "100"), 0);
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain", "--simplify", "60"), 0);
   assert_says(text, "simplified from ");
-  check_morphs(100);
+  check_morphs(60);
 }
 
 TEST(test_glb_compressed_names_remedy_for_model_viewer) {
