@@ -4,7 +4,7 @@
 // translucent shell with contours in the slices and without a ball, long names fit, the patient lies on the table, and on
 // a phone the picture comes first.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, openLungs, press, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
@@ -148,3 +148,11 @@ for (const [width, height, colorScheme, chosen] of [[1440, 900, 'light', '1'], [
   assert.deepEqual(said, []);
   await close(sized);
 }
+
+/* A model that was fitted to the patient is named on the first screen. */
+const fitted = join(folder, 'fitted.html');
+writeFileSync(fitted, readFileSync(html, 'utf8').replace('&quot;metadata&quot;:{', '&quot;metadata&quot;:{&quot;patient&quot;:&quot;two states and 300 landmarks&quot;,'));
+const { page: own } = await openLungs(fitted, { viewport: { width: 390, height: 844 } }, '');
+assert.equal(await own.locator('#patient-fit').textContent(), 'fitted to this patient: two states and 300 landmarks');
+assert.ok((await own.locator('#patient-fit').boundingBox()).y < 100);
+await close(own);
