@@ -170,13 +170,14 @@ json_t *supine_report_postures(const supine_comparison *c) {
     const supine_compared_posture *p = &c->posture[i];
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label, "line",
-                        supine_report_line(i), "held", make_lungs(c, i), "mean",
-                        json_sprintf("%.1f", p->displacement.mean), "max",
-                        json_sprintf("%.1f", p->displacement.max), "error",
-                        json_sprintf(p->expected_error > 0 ? "%.1f" : "", p->expected_error),
-                        "ratio_mark", mark_of(c, i, "ratio"), "ratio",
-                        json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
+        list,
+        json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label, "line",
+                  supine_report_line(i), "held", make_lungs(c, i), "mean",
+                  json_sprintf("%.1f", p->displacement.mean), "max",
+                  json_sprintf("%.1f", p->displacement.max), "error",
+                  p->expected_error > 0 ? json_sprintf("%.1f", p->expected_error) : json_string(""),
+                  "ratio_mark", mark_of(c, i, "ratio"), "ratio",
+                  isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio)));
   }
   return list;
 }
