@@ -20,7 +20,7 @@ import shutil
 import sys
 
 source, demo, site = sys.argv[1:4]
-OTHERS = ["model", "accuracy", "paper", "trust", "inputs", "promises", "platforms"]
+OTHERS = ["model", "accuracy", "paper", "trust", "inputs", "compare", "promises", "platforms"]
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #121d2b; --soft: #4b596b; --line: #d5dce6; --ground: #fff; --code: #f1f4f8; --link: #0e6370; }

@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "base/output.h"
+#include "base/text.h"
 #include "base/vec3.h"
 
 #include "program/command/list.h"
@@ -15,18 +16,22 @@
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
-static supine_status write_html(const char *path, const supine_comparison *comparison,
+static supine_status write_file(const char *path, const supine_comparison *comparison,
                                 supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
-  SUPINE_TRY(supine_report_html(comparison, output.file, error));
+  if (supine_text_ends_in(path, ".csv")) {
+    supine_report_table(comparison, output.file);
+  } else {
+    SUPINE_TRY(supine_report_html(comparison, output.file, error));
+  }
   return supine_output_commit(&output, error);
 }
 
 typedef struct request {
   supine_comparison comparison;
   const char *postures;
-  const char *html;
+  const char *output;
   const char *inside;
   bool json;
   int frame; /* 1 if the hilum stays in place, 0 if the body does */
@@ -48,8 +53,10 @@ static const supine_option table[] = {
      "each, with its expected error",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
-    {"output", 'o', "FILE", ".html file to write: a report with charts and pictures",
-     SUPINE_FILLS(request, html), .file = SUPINE_FILE_OUT, .endings = ".html"},
+    {"output", 'o', "FILE",
+     ".html: a report to read and print\n.csv: a table with a row for the surface, each lung and "
+     "each structure in each posture; docs/compare.md describes it and --json",
+     SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .endings = ".html or .csv"},
     {.name = NULL}};
 
 /* Append a structure to the list of targets or of anatomy. */
@@ -130,7 +137,7 @@ static supine_status report(supine_comparison *c, const request *wanted, supine_
   }
   SUPINE_TRY(supine_report_find(c, error));
   supine_report_print(c, wanted->json);
-  return wanted->html != NULL ? write_html(wanted->html, c, error) : SUPINE_OK;
+  return wanted->output != NULL ? write_file(wanted->output, c, error) : SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -157,7 +164,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       "leave --from out, or use 'supine deform --from'",
       c->path);
   SUPINE_REFUSE_IF(
-      content && wanted->html != NULL, error, SUPINE_ERROR_ARGUMENT,
+      content && wanted->output != NULL, error, SUPINE_ERROR_ARGUMENT,
       "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
       "lungs, and the structures by --inside",
       c->path);
@@ -172,7 +179,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_compare = {
     "compare",
     "compare postures: displacement, and ventilation by height",
-    .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o report.html] [OPTIONS]",
+    .usage = "BASIS [--postures LIST] [--volume VOLUME] [-o FILE] [OPTIONS]",
     .about = "For each posture, reports the displacement from supine at rest or from the state of "
              "--from, the volume of each lung, and the ventilation by height in a breath. If BASIS "
              "was made by 'supine embed', reports only the displacement of each named part between "
@@ -193,7 +200,8 @@ const supine_command supine_command_compare = {
     "\n"
     "Examples:\n"
     "  supine compare lungs.safetensors --postures supine,prone:rest+500,supine+15,0.6:0:-0.8\n"
-    "  supine compare lungs.safetensors --inside nodules.safetensors -o report.html",
+    "  supine compare lungs.safetensors --inside nodules.safetensors -o report.html\n"
+    "  supine compare lungs.safetensors --inside nodules.safetensors -o table.csv",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

@@ -22,6 +22,7 @@ typedef struct request {
   bool glb_only; /* whether an option was given that applies to .glb files only */
   bool breathes; /* whether --breath was given */
   const char *inside;
+  size_t simplify; /* 0 to keep all vertices */
   export_glb_options glb;
 } request;
 
@@ -37,6 +38,10 @@ static const supine_option table[] = {
      "between 0 and 1",
      SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
      SUPINE_SAYS_GIVEN(request, breathes), .wants = "millilitres above 0"},
+    {"simplify", 0, "N",
+     "keep about N vertices, each with its own displacement, and span new triangles between them, "
+     "for a smaller and faster file; the output says how far the new surface is from the whole one",
+     SUPINE_FILLS(request, simplify), .range = {8, UINT32_MAX}},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "
@@ -48,7 +53,9 @@ static const supine_option table[] = {
     {.help = "For glTF:"},
     {"plain", 0, NULL,
      "write float32 without compression, for engines that lack EXT_meshopt_compression or "
-     "KHR_mesh_quantization",
+     "KHR_mesh_quantization. three.js reads the compressed file; model-viewer refuses it unless "
+     "its "
+     "meshoptDecoderLocation is set",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
      "add animations of breathing: one while gravity turns from supine over the left side to prone "
@@ -56,15 +63,31 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, glb.animate), SUPINE_SAYS_GIVEN(request, glb_only)},
     {.name = NULL}};
 
+/* Print how far a simplified surface is from the whole one. */
+static void print_simplified(const supine_basis *basis, const export_written *written) {
+  (void)supine_print(stdout,
+                     "simplified from %zu to %zu vertices: %.3f mm RMS and %.2f mm at most from "
+                     "the whole surface\n",
+                     supine_basis_get_info(basis)->vertex_count, written->vertices, written->rms,
+                     written->largest);
+}
+
 static supine_status write_glb(const supine_basis *basis, const request *wanted,
                                supine_error *error) {
-  size_t bytes = 0;
-  SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &bytes, error));
+  export_written written;
+  SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &written, error));
+  const size_t bytes = written.bytes;
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   const bool small = bytes < 100000;
-  (void)supine_print(stdout, "%s: %zu lung%s with morph targets%s, %.*f %s\n", wanted->path, lungs,
-                     lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
-                     small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB");
+  (void)supine_print(stdout, "%s: %zu lung%s with morph targets%s, %.*f %s%s\n", wanted->path,
+                     lungs, lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
+                     small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB",
+                     wanted->glb.plain ? ""
+                                       : ", compressed; for model-viewer, set its "
+                                         "meshoptDecoderLocation or use --plain");
+  if (wanted->simplify > 0) {
+    print_simplified(basis, &written);
+  }
   return SUPINE_OK;
 }
 
@@ -94,7 +117,9 @@ static supine_status write_page(const supine_basis *basis, const request *wanted
   SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   supine_options_basis_title(basis_path, title, sizeof title);
+  export_written written;
   export_page page = {.breath = wanted->glb.breath,
+                      .simplify = wanted->simplify,
                       .from = from,
                       .title = wanted->title != NULL ? wanted->title : title,
                       .names = &names};
@@ -104,20 +129,23 @@ static supine_status write_page(const supine_basis *basis, const request *wanted
     page.inside = inside;
   }
   SUPINE_TRY(supine_output_open(wanted->path, &output, error));
-  SUPINE_TRY(supine_export_html_print(output.file, basis, &page, error));
+  SUPINE_TRY(supine_export_html_print(output.file, basis, &page, &written, error));
   SUPINE_TRY(supine_output_commit(&output, error));
-  (void)printf("%s: HTML page of %zu vertices", wanted->path,
-               supine_basis_get_info(basis)->vertex_count);
+  (void)printf("%s: HTML page of %zu vertices", wanted->path, written.vertices);
   if (inside != NULL) {
     (void)printf(" and %zu structure%s inside the lungs", names.count, names.count == 1 ? "" : "s");
   }
   (void)puts("; open it in any browser");
+  if (wanted->simplify > 0) {
+    print_simplified(basis, &written);
+  }
   return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
+  wanted->glb.simplify = wanted->simplify;
   const bool page = supine_text_ends_in(wanted->path, ".html");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   SUPINE_REFUSE_IF(page && wanted->glb_only, error, SUPINE_ERROR_ARGUMENT,
@@ -158,6 +186,7 @@ const supine_command supine_command_export = {
              "  supine embed lungs.safetensors nodules.csv -o inside.safetensors\n"
              "  supine export lungs.safetensors --inside inside.safetensors -o lungs.html\n"
              "  supine export lungs.safetensors -o lungs.html --from scan\n"
+             "  supine export lungs.safetensors -o lungs.html --simplify 5000\n"
              "  supine export lungs.safetensors -o lungs.glb --animate\n"
              "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
     SUPINE_ONE_BASIS,

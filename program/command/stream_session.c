@@ -112,7 +112,8 @@ static supine_status print_page(const supine_stream_session *wanted, const supin
   if (file == NULL) {
     return supine_error_memory(error, "the page");
   }
-  const supine_status status = supine_export_html_print(file, basis, &shown, error);
+  export_written written;
+  const supine_status status = supine_export_html_print(file, basis, &shown, &written, error);
   const bool failed = ferror(file) != 0;
   const bool closed = fclose(file) == 0; /* sets html and size */
   if (status == SUPINE_OK && (failed || !closed)) {

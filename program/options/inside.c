@@ -202,8 +202,11 @@ void supine_options_targets_free(supine_target **targets) {
 const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]) {
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
-  (void)snprintf(way, 96, "%s", target->moved <= target->expected ? SUPINE_TARGET_UNTOLD : "");
-  if (target->moved > target->expected) {
+  if (target->moved <= target->expected) {
+    (void)supine_print_text(way, 96, "%.1f mm, within its error of %.1f", target->moved,
+                            target->expected);
+  } else {
+    way[0] = '\0';
     for (size_t i = 0; i < most; ++i) {
       size_t axis = left[0] > left[1] ? 0U : 1U;
       axis = left[2] > left[axis] ? 2 : axis;

@@ -62,11 +62,9 @@ size_t supine_options_targets_first(const supine_target *targets, size_t count);
 /* Free *targets; for SUPINE_FREED_BY. */
 void supine_options_targets_free(supine_target **targets);
 
-#define SUPINE_TARGET_UNTOLD "no change that the model can tell"
-
 /* Write the direction of a target's displacement in words, with at most `most` parts and the
- * largest first: "12 to the feet, 7 to the front". A displacement below its expected error is
- * SUPINE_TARGET_UNTOLD. Return `way`. */
+ * largest first: "12 to the feet, 7 to the front". For a displacement below its expected error,
+ * write "0.7 mm, within its error of 3.6". Return `way`. */
 const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]);
 
 /* Subtract a displacement, mm, such as that of the hilum, from a target's position and

@@ -14,7 +14,10 @@
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
 
-enum { SUPINE_COMPARISON_SLABS = 10 };
+enum {
+  SUPINE_COMPARISON_SLABS = 10,
+  SUPINE_COMPARISON_SCHEMA = 1 /* version of the keys and columns in docs/compare.md */
+};
 
 /* Results for one posture. */
 typedef struct supine_compared_posture {
@@ -54,6 +57,11 @@ supine_status supine_report_find(supine_comparison *comparison, supine_error *er
 
 void supine_report_free(supine_comparison *comparison);
 
+/* Return whether a posture is the state from which displacements are measured. */
+static inline bool supine_report_is_reference(const supine_comparison *comparison, size_t posture) {
+  return comparison->posture[posture].displacement.max < 0.05;
+}
+
 /* Write the volume of `comparison->volume` to `text`, for example "at rest + 300 mL". */
 void supine_report_volume(const supine_comparison *comparison, char *text, size_t size);
 
@@ -69,6 +77,9 @@ json_t *supine_report_held(const supine_comparison *comparison, size_t posture, 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);
 
+/* Write the comparison as CSV. A write error sets the error indicator of `file`. */
+void supine_report_table(const supine_comparison *comparison, FILE *file);
+
 /* Print the comparison as HTML. If pictures cannot be drawn, the page states the reason in their
  * place. A write error sets the error indicator of `file`. */
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
@@ -77,15 +88,19 @@ supine_status supine_report_html(const supine_comparison *comparison, FILE *file
 /* Return the colour of a posture's line in charts. */
 const char *supine_report_line(size_t posture);
 
-/* Return the rows of the targets or of the anatomy, {{targeted}} or {{anatomical}}; NULL if there
- * are none. */
-json_t *supine_report_targets(const supine_comparison *comparison, bool anatomy);
-
 /* Return the values of the tags of report.html that have these names. */
 json_t *supine_report_findings(const supine_comparison *comparison);
 json_t *supine_report_postures(const supine_comparison *comparison);
 json_t *supine_report_profile(const supine_comparison *comparison);
 json_t *supine_report_outlines(const supine_comparison *comparison);
+json_t *supine_report_footnotes(const supine_comparison *comparison);
+
+/* Return the tables with a row for each target, or for each structure that is anatomy, and a column
+ * for each posture but the reference; NULL if there are no rows or no columns. */
+json_t *supine_report_matrix(const supine_comparison *comparison, bool anatomy);
+
+/* Return the outlines in three planes through each target; NULL if there are no targets. */
+json_t *supine_report_target_outlines(const supine_comparison *comparison);
 
 /* Return the value of the tag {{pictures}}. If pictures cannot be drawn, set `error` and return
  * NULL. */

@@ -8,10 +8,19 @@
 #include "base/text.h"
 #include "program/report/comparison.h"
 
-/* Published values, mean (SD), for the postures' table rows; report.html names the sources. */
+/* Published values, mean (SD), as footnotes of the table of postures. */
 static const struct {
-  const char *posture, *percent, *ratio;
-} published[] = {{"supine", "", "1.75"}, {"left", "0 (44), +25 (11)", ""}};
+  const char *posture;
+  const char *of; /* value that has the mark: "percent", or "ratio" of the breath */
+  const char *mark;
+  const char *text;
+} published[] = {
+    {"left", "percent", "a",
+     "Published on the left side: left lung 0 % (SD 44), right lung +25 % (SD 11) of the supine "
+     "volume (Little 2021, n 10)."},
+    {"supine", "ratio", "b",
+     "Published supine: 1.75, specific ventilation of the dependent third 0.42 (SD 0.14) over the "
+     "nondependent 0.24 (SD 0.08) (Sa 2010, n 8)."}};
 
 /* Compute the change of each lung's volume between the reference pose and a posture, %. */
 static void find_changes(const supine_comparison *c, size_t posture, double *percent) {
@@ -39,22 +48,32 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
   return gain[1] / volume[1] / (gain[0] / volume[0]);
 }
 
-/* Return the first structure in a posture that is a target; NULL if there is none. */
-static const supine_target *first_target(const supine_comparison *c,
-                                         const supine_compared_posture *p) {
-  for (size_t k = 0; k < c->names.count; ++k) {
-    if (!p->targets[k].anatomy) {
-      return &p->targets[k];
+/* Return the index of the target that the sentences are about: that with the largest displacement
+ * in any posture, in multiples of its expected error. */
+static size_t find_first(const supine_comparison *c) {
+  size_t first = 0;
+  double most = -1.0;
+  if (c->inside == NULL) {
+    return 0;
+  }
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    const size_t k = supine_options_targets_first(c->posture[i].targets, c->names.count);
+    const supine_target *t = &c->posture[i].targets[k];
+    const double ratio = t->expected > 0.0 ? t->moved / t->expected : t->moved;
+    if (!supine_report_is_reference(c, i) && ratio > most) {
+      most = ratio;
+      first = k;
     }
   }
-  return NULL;
+  return first;
 }
 
-/* Return a sentence on a posture: how far the first target or, without targets, the surface moves.
- * A displacement below its expected error is no change that the model can tell. */
-static json_t *finding(const supine_comparison *c, size_t posture) {
+/* Return a sentence on a posture: how far target `first` or, without targets, the surface moves.
+ * Anatomy is not a target. */
+static json_t *finding(const supine_comparison *c, size_t posture, size_t first) {
   const supine_compared_posture *p = &c->posture[posture];
-  const supine_target *t = p->targets != NULL ? first_target(c, p) : NULL;
+  const supine_target *t =
+      p->targets != NULL && !p->targets[first].anatomy ? &p->targets[first] : NULL;
   const double moved = t != NULL ? t->moved : p->displacement.mean;
   const double error = t != NULL ? t->expected : p->expected_error;
   const char *name = p->item->name;
@@ -68,105 +87,99 @@ static json_t *finding(const supine_comparison *c, size_t posture) {
     supine_text_add(text, sizeof text, "With gravity along %s,", name);
   }
   supine_text_add(text, sizeof text, " %s", t != NULL ? t->name : "the surface");
+  supine_text_add(text, sizeof text, " moves %.1f mm%s", moved, t == NULL ? " on average" : "");
   if (moved <= error) {
-    supine_text_add(text, sizeof text, ": " SUPINE_TARGET_UNTOLD " (%.1f mm", moved);
-  } else if (t != NULL) {
-    supine_text_add(text, sizeof text, " moves %.1f mm: %s", moved,
-                    supine_options_target_way(t, 2, way));
+    supine_text_add(text, sizeof text, ", within its error of %.1f.", error);
+    return supine_options_json_text(text);
+  }
+  if (t != NULL) {
+    supine_text_add(text, sizeof text, ": %s", supine_options_target_way(t, 2, way));
   } else {
-    supine_text_add(text, sizeof text, " moves %.1f mm on average, %.1f mm at most", moved,
-                    p->displacement.max);
+    supine_text_add(text, sizeof text, ", %.1f mm at most", p->displacement.max);
   }
   if (error > 0) {
     supine_text_add(text, sizeof text, "; expected error %.1f mm", error);
   }
-  supine_text_add(text, sizeof text, moved <= error ? ")." : ".");
+  supine_text_add(text, sizeof text, ".");
   return supine_options_json_text(text);
 }
 
 json_t *supine_report_findings(const supine_comparison *c) {
   enum { SENTENCES = 3 };
   json_t *list = json_array();
+  const size_t first = find_first(c);
   for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
-    if (c->posture[i].displacement.max >= 0.05) { /* this posture is not the reference */
-      (void)json_array_append_new(list, finding(c, i));
+    if (!supine_report_is_reference(c, i)) {
+      (void)json_array_append_new(list, finding(c, i, first));
     }
   }
   return list;
 }
 
-/* Return a volume as text, mL; "open" for surfaces that enclose none, "" for points. */
-static json_t *volume_text(double volume) {
-  SUPINE_C_LOCALE;
-  if (isnan(volume)) {
-    return json_string("open");
+/* Return the mark of the footnote on a value of a posture, or NULL. */
+static const char *mark_of(const supine_comparison *c, size_t posture, const char *of) {
+  if (strcmp(of, "ratio") == 0 && !c->posture[posture].has_breath) {
+    return NULL;
   }
-  return volume != 0.0 ? json_sprintf("%.1f", volume) : json_string("");
-}
-
-/* Return the row of a structure in a posture. */
-static json_t *target_row(const char *name, const supine_compared_posture *p,
-                          const supine_target *t) {
-  SUPINE_C_LOCALE;
-  char way[96];
-  return json_pack("{s:s, s:s, s:o, s:o, s:o, s:s, s:o}", "name", name, "posture", p->label,
-                   "before", volume_text(t->volume[0]), "after", volume_text(t->volume[1]), "moved",
-                   json_sprintf("%.1f", t->moved), "way", supine_options_target_way(t, 3, way),
-                   "error",
-                   isnan(t->expected) ? json_string("unknown") : json_sprintf("%.1f", t->expected));
-}
-
-json_t *supine_report_targets(const supine_comparison *c, bool anatomy) {
-  json_t *list = json_array();
-  for (size_t k = 0; c->inside != NULL && k < c->names.count; ++k) {
-    const char *name = c->names.text[k];
-    for (size_t i = 0; i < c->postures.count; ++i) {
-      const supine_target *t = &c->posture[i].targets[k];
-      const bool is_reference = c->posture[i].displacement.max < 0.05;
-      if (!is_reference && t->anatomy == anatomy) {
-        (void)json_array_append_new(list, target_row(name, &c->posture[i], t));
-        name = "";
-      }
+  for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
+    if (strcmp(published[j].of, of) == 0 &&
+        strcmp(published[j].posture, c->posture[posture].item->name) == 0) {
+      return published[j].mark;
     }
   }
-  if (json_array_size(list) > 0) {
-    return json_pack("{s:o}", anatomy ? "parts" : "targets", list);
-  }
-  json_decref(list);
   return NULL;
+}
+
+json_t *supine_report_footnotes(const supine_comparison *c) {
+  json_t *list = json_array();
+  for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
+    bool used = false;
+    for (size_t i = 0; i < c->postures.count; ++i) {
+      const char *mark = mark_of(c, i, published[j].of);
+      used = used || (mark != NULL && strcmp(mark, published[j].mark) == 0);
+    }
+    if (used) {
+      (void)json_array_append_new(
+          list, json_pack("{s:s, s:s}", "mark", published[j].mark, "text", published[j].text));
+    }
+  }
+  return list;
+}
+
+/* Return the cells with the volume of each lung in a posture, its range and its change. */
+static json_t *make_lungs(const supine_comparison *c, size_t posture) {
+  SUPINE_C_LOCALE;
+  const supine_compared_posture *p = &c->posture[posture];
+  double percent[SUPINE_LUNGS_MAX] = {0};
+  json_t *lungs = json_array();
+  find_changes(c, posture, percent);
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    const supine_held held = supine_options_held(c->basis, &p->item->state, &p->pose, lung);
+    json_t *range = held.assumed ? json_sprintf("%.0f to %.0f", held.low, held.high) : json_null();
+    (void)json_array_append_new(
+        lungs, json_pack("{s:o, s:o, s:o, s:s*}", "range", range, "ml",
+                         json_sprintf("%.0f", p->volume[lung]), "percent",
+                         json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]),
+                         "mark", mark_of(c, posture, "percent")));
+  }
+  return lungs;
 }
 
 json_t *supine_report_postures(const supine_comparison *c) {
   SUPINE_C_LOCALE;
-  const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_array();
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_compared_posture *p = &c->posture[i];
-    json_t *lungs = json_array();
-    double percent[SUPINE_LUNGS_MAX] = {0};
-    const char *words[2] = {"", ""};
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
-    find_changes(c, i, percent);
-    for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      (void)json_array_append_new(
-          lungs, json_pack("{s:o, s:o, s:o}", "range", supine_report_held(c, i, lung, true), "ml",
-                           json_sprintf("%.0f", p->volume[lung]), "percent",
-                           json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung])));
-    }
-    for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
-      if (strcmp(published[j].posture, p->item->name) == 0) {
-        words[0] = published[j].percent;
-        words[1] = published[j].ratio;
-      }
-    }
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s, s:s, s:o}", "name", p->label, "line",
-                        supine_report_line(i), "held", lungs, "mean",
-                        json_sprintf("%.1f", p->displacement.mean), "max",
-                        json_sprintf("%.1f", p->displacement.max), "error",
-                        json_sprintf(p->expected_error > 0 ? "%.1f" : "", p->expected_error),
-                        "published_percent", words[0], "published_ratio", words[1], "ratio",
-                        json_sprintf(isnan(ratio) ? "" : "%.2f", ratio)));
+        list,
+        json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label, "line",
+                  supine_report_line(i), "held", make_lungs(c, i), "mean",
+                  json_sprintf("%.1f", p->displacement.mean), "max",
+                  json_sprintf("%.1f", p->displacement.max), "error",
+                  p->expected_error > 0 ? json_sprintf("%.1f", p->expected_error) : json_string(""),
+                  "ratio_mark", mark_of(c, i, "ratio"), "ratio",
+                  isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio)));
   }
   return list;
 }

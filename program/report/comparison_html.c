@@ -60,7 +60,28 @@ static json_t *provenance(const supine_comparison *c, json_t *file, json_t *toda
   return list;
 }
 
-/* Return the outlines, with the names and colours of those drawn; NULL for a single posture. */
+/* Return a matrix with the heading of its first column; NULL if it has no rows. */
+static json_t *matrix(const supine_comparison *c, bool anatomy, const char *label) {
+  json_t *made = c->inside != NULL ? supine_report_matrix(c, anatomy) : NULL;
+  if (made != NULL) {
+    (void)json_object_set_new(made, "label", json_string(label));
+  }
+  return made;
+}
+
+/* Return the outlines through targets, with the names and colours of those drawn, or NULL. */
+static json_t *traces(const supine_comparison *c) {
+  json_t *made = c->inside != NULL ? supine_report_target_outlines(c) : NULL;
+  if (made != NULL) {
+    const json_t *first = json_array_get(json_object_get(made, "traced"), 0);
+    const json_t *chart = json_array_get(json_object_get(first, "outlines"), 0);
+    (void)json_object_set(made, "drawn", json_object_get(chart, "lines"));
+  }
+  return made;
+}
+
+/* Return the outlines in slices, with the names and colours of those drawn; NULL for a single
+ * posture. */
 static json_t *outlined(const supine_comparison *c) {
   json_t *outlines = c->postures.count > 1 ? supine_report_outlines(c) : NULL;
   return outlines == NULL ? NULL
@@ -77,19 +98,20 @@ static json_t *values(const supine_comparison *c) {
   json_t *file = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
   json_t *today = date();
+  json_t *traced = traces(c);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:s, s:o*, s:o*, s:s*, s:b, s:o*, "
-      "s:o*}",
+      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, s:s*, "
+      "s:b, s:o*, s:o*}",
       "provenance", provenance(c, file, today), "file", file, "date", today, "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
       volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
       json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
       "postures", supine_report_postures(c), "findings", supine_report_findings(c), "lungs",
-      lungs(c), "reference", c->reference.name, "targeted", supine_report_targets(c, false),
-      "anatomical", supine_report_targets(c, true), "meaning",
-      c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL, "assumed",
-      supine_basis_metadata(c->basis, "resting_known") == NULL, "outlined", outlined(c),
-      "ventilation",
+      lungs(c), "footnotes", supine_report_footnotes(c), "reference", c->reference.name, "targets",
+      matrix(c, false, "target, mm"), "traces", traced, "lobes", matrix(c, true, "structure"),
+      "meaning", c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL,
+      "assumed", supine_basis_metadata(c->basis, "resting_known") == NULL, "outlined",
+      traced == NULL ? outlined(c) : NULL, "ventilation",
       c->breath > 0.0 ? json_pack("{s:o}", "profile", supine_report_profile(c)) : NULL);
 }
 

@@ -145,10 +145,14 @@ static void add_tables(const supine_comparison *c, json_t *text) {
 void supine_report_print(const supine_comparison *c, bool json) {
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
-  json_t *root = json_pack("{s:o, s:s, s:s, s:I, s:f}", "file", supine_options_json_text(c->path),
-                           "volume", volume, "displacement_from", c->reference.name, "vertices",
+  json_t *root = json_pack("{s:i, s:o, s:s, s:s, s:I, s:f}", "schema", SUPINE_COMPARISON_SCHEMA,
+                           "file", supine_options_json_text(c->path), "volume", volume,
+                           "displacement_from", c->reference.name, "vertices",
                            (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                            supine_compare_area(c->compare));
+  if (!json) {
+    (void)json_object_del(root, "schema");
+  }
   if (json) {
     json_t *postures = json_array();
     for (size_t i = 0; i < c->postures.count; ++i) {

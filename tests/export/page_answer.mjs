@@ -18,8 +18,8 @@ const [rest] = json.postures;
 const cards = await page.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent));
 json.postures.forEach(({ name, displacement_mm: mm, expected_error_mm: error }, i) => {
   if (i === 0) return assert.equal(cards[0], 'reference');
-  const [, mean, words] = /^([\d.]+) mm(, within the error| on average)$/.exec(cards[i]);
-  assert.equal(words, mm.mean > error ? ' on average' : ', within the error', name);
+  const [, mean, words] = /^([\d.]+) mm(, error [\d.]+| on average)$/.exec(cards[i]);
+  assert.equal(words, mm.mean > error ? ' on average' : `, error ${error.toFixed(1)}`, name);
   return assert.ok(Math.abs(Number(mean) - mm.mean) <= 0.051, `${name}: ${cards[i]}, not ${mm.mean}`);
 });
 const surface = (await page.locator('#surface-text').textContent()).match(/[\d.]+\d/g).map(Number);

@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { open } from './browser.mjs';
+import { close, open } from './browser.mjs';
 import { basis } from './lungs.mjs';
 import { folder, skip, supine } from './support.mjs';
 
@@ -26,12 +26,12 @@ const cells = await page.evaluate(() => [...document.querySelectorAll('table')].
   headings: [...table.querySelectorAll('th')].map((cell) => cell.textContent.trim()).filter(Boolean),
   cells: [...table.querySelectorAll('td')].map((cell) => cell.textContent.trim()).filter(Boolean),
 })));
-assert.equal(cells.length, 3);
+assert.equal(cells.length, 5); // of three times three postures, of volumes, and the provenance
 const cards = await page.evaluate(() => [...document.querySelectorAll('section')].map((section) => ({
   heading: section.querySelector('h2').textContent,
   first: section.innerText.split('\n').map((line) => line.trim()).filter(Boolean)[1].split(/\s+/)[0],
 })));
-assert.deepEqual(cards.map(({ heading }) => heading).slice(0, 3), ['Changes from supine at rest', 'Outlines by slice', 'Ventilation by height']);
+assert.deepEqual(cards.map(({ heading }) => heading).slice(0, 3), ['Changes from supine at rest', 'Where each target was and is', 'Lungs']);
 /* Pictures and rows of tables are not split between sheets. */
 await page.emulateMedia({ media: 'print' });
 const parted = await page.evaluate(() => [...document.querySelectorAll('tr, figure, .scale, .whole')].filter((e) => getComputedStyle(e).breakInside !== 'avoid').length);
@@ -41,33 +41,54 @@ await page.emulateMedia({ media: null });
 const json = JSON.parse(supine('compare', basis, '--inside', inside, '--postures', postures.join(','), '--volume', 'rest+120', '--json').replace(/^[^{]*/, ''));
 assert.equal(json.displacement_from, 'supine at rest');
 
-/* The first table has volumes, their changes from supine at rest in %, and displacements. */
+/* The table of postures has volumes, their changes from supine at rest in %, and displacements. */
 const supineRest = JSON.parse(supine('compare', basis, '--postures', 'supine', '--json').replace(/^[^{]*/, '')).postures[0].volume_ml;
-const summary = await page.evaluate(() => [...document.querySelectorAll('.summary table:not(.targets) tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
+const summary = await page.evaluate(() => [...document.querySelectorAll('table.postures tbody tr')].map((row) => [...row.cells].map((cell) => [...cell.childNodes].filter(({ nodeName }) => !['SMALL', 'SUP'].includes(nodeName)).map((node) => node.textContent).join(''))));
 assert.deepEqual(summary.map(([name]) => name), postures.map((name) => ({ left: 'left side', right: 'right side' })[name] ?? name));
 json.postures.forEach(({ volume_ml: ml, displacement_mm: mm, expected_error_mm: error, slabs }, i) => {
   ['left', 'right'].forEach((lung, j) => {
     assert.ok(Math.abs(Number(summary[i][1 + j]) - ml[lung].value) <= 0.5, `${summary[i]}`);
     assert.ok(Math.abs(Number(summary[i][3 + j]) - (100 * ml[lung].value) / supineRest[lung].value + 100) <= 0.51, `${summary[i]}`);
   });
-  [mm.mean, mm.max, error].forEach((x, k) => assert.ok(Math.abs(Number(summary[i][6 + k]) - x) <= 0.051, `${summary[i]}`));
+  [mm.mean, mm.max, error].forEach((x, k) => assert.ok(Math.abs(Number(summary[i][5 + k]) - x) <= 0.051, `${summary[i]}`));
   const third = (list) => list.slice(0, 4).reduce(([gain, volume], slab, k) => { const part = k < 3 ? 1 : 1 / 3; return [gain + part * slab.gain_ml, volume + part * slab.volume_ml]; }, [0, 0]);
   const [[g, v], [h, w]] = [third(slabs.toReversed()), third(slabs)];
   if (postures[i] !== 'supine') return;
-  assert.ok(Math.abs(g / v / (h / w) - Number(summary[i][9])) < 0.06, `${summary[i]}`); // the breath of the report is smaller
-  assert.equal(summary[i][10], '1.75');
+  assert.ok(Math.abs(g / v / (h / w) - Number(summary[i][8])) < 0.06, `${summary[i]}`); // the breath of the report is smaller
 });
+/* Published values are footnotes of the values beside which they stand. */
+const notes = await page.evaluate(() => ({ marks: [...document.querySelectorAll('table.postures tbody tr')].map((row) => [...row.querySelectorAll('sup')].map((sup) => sup.textContent).join('')), texts: [...document.querySelectorAll('.footnote')].map((note) => note.textContent) }));
+assert.deepEqual(notes.marks, ['b', '', 'aa', '', '', '', '', '', '']);
+assert.match(notes.texts[0], /^a Published on the left side.*Little 2021/);
+assert.match(notes.texts[1], /^b Published supine: 1\.75.*Sa 2010/);
 const findings = await page.evaluate(() => [...document.querySelectorAll('.finding')].map((e) => e.textContent));
 assert.equal(findings.length, 3);
-assert.match(findings[2], /^Lying on the left side, nodule/);
-/* The table of targets has the numbers of --json. */
-const rows = await page.evaluate(() => [...document.querySelectorAll('.targets tbody tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
-const expected = ['nodule', 'mark'].flatMap((name) => json.postures.map(({ targets }) => targets.find((target) => target.name === name)));
-assert.equal(rows.length, expected.length);
-expected.forEach(({ mm, expected_error_mm: error }, i) => {
-  assert.ok(Math.abs(Number(rows[i][2]) - mm) <= 0.051 && Math.abs(Number(rows[i][4]) - error) <= 0.051, `${rows[i]}`);
-  assert.equal(rows[i][3] === 'no change that the model can tell', mm <= error, `${rows[i]}`);
+assert.match(findings[2], /^With gravity|^Lying on the left side, (nodule|mark) moves [\d.]+ mm/);
+/* The matrix has the numbers of --json: a row for each target, and a column for each posture but the reference. */
+const matrix = await page.evaluate(() => [...document.querySelectorAll('table.matrix')].map((table) => ({ heads: [...table.tHead.rows[0].cells].slice(1).map((cell) => cell.textContent), rows: [...table.tBodies[0].rows].map((row) => ({ name: row.cells[0].textContent, cells: [...row.cells].slice(1).map((cell) => [cell.firstChild.textContent.trim(), cell.lastChild.textContent]) })) })));
+const moved = json.postures; // at rest + 120 mL, supine has moved too
+assert.deepEqual(matrix.flatMap(({ heads }) => heads), summary.map(([name]) => name));
+assert.ok(matrix.every(({ heads }) => heads.length <= 4));
+moved.forEach(({ targets }, i) => {
+  for (const { name, mm, expected_error_mm: error } of targets) {
+    const [size, words] = matrix[Math.floor(i / 3)].rows.find((row) => row.name === name).cells[i % 3];
+    const [, said, within] = /^([\d.]+) \u00b1 ([\d.]+)$/.exec(size).map(Number);
+    assert.ok(Math.abs(said - mm) <= 0.051 && Math.abs(within - error) <= 0.051, `${name}: ${size}`);
+    assert.equal(words === `within its error of ${error.toFixed(1)}`, mm <= error, `${name}: ${words}`);
+  }
 });
+/* Three planes show where each target was, and a dot for each posture where it is. */
+const traced = await page.evaluate(() => [...document.querySelectorAll('.thirds figure')].map((figure) => ({ title: figure.querySelector('figcaption').textContent, dots: figure.querySelectorAll('circle:not(.was)').length, was: ['cx', 'cy'].map((at) => Number(figure.querySelector('.was').getAttribute(at))), at: Object.fromEntries([...figure.querySelectorAll('circle:not(.was)')].map((dot) => [dot.textContent, ['cx', 'cy'].map((at) => Number(dot.getAttribute(at)))])) })));
+assert.deepEqual(traced.map(({ title }) => title.split(',')[0]), ['axial', 'coronal', 'sagittal', 'axial', 'coronal', 'sagittal']);
+const PLANES = { axial: (x) => [x[0], x[1]], coronal: (x) => [x[0], -x[2]], sagittal: (x) => [x[1], -x[2]] };
+['nodule', 'mark'].forEach((name, k) => moved.forEach(({ targets }, i) => {
+  const { move } = targets.find((target) => target.name === name);
+  for (const { title, was, at, dots } of traced.slice(3 * k, 3 * k + 3)) {
+    assert.equal(dots, postures.length);
+    const seen = at[summary[i][0]].map((x, axis) => x - was[axis]);
+    PLANES[title.split(',')[0]](move).forEach((x, axis) => assert.ok(Math.abs(x - seen[axis]) < 0.11, `${name}, ${title}: ${seen}, not ${x}`));
+  }
+}));
 for (const format of ['A4', 'Letter']) {
   const pdf = join(folder, `${format}.pdf`);
   await page.pdf({ path: pdf, format, preferCSSPageSize: false, printBackground: true });
@@ -95,11 +116,14 @@ for (const format of ['A4', 'Letter']) {
     assert.ok(bySheet.some((sheet) => { const at = sheet.indexOf(heading.replace(/\s+/g, '')); return at >= 0 && sheet.indexOf(first, at + heading.replace(/\s+/g, '').length) >= 0; }), `${format}: '${heading}' is parted from '${first}'`);
   }
   assert.match(text, /\d{4}-\d\d-\d\d/);
-  assert.ok(sheets.length <= 4, `${format}: ${sheets.length} sheets`); // of nine postures; four postures take three
+  assert.ok(sheets.length <= 6, `${format}: ${sheets.length} sheets`); // of nine postures and two targets; four postures take four
 }
 
-/* The areas of outlines differ from that of the reference by the stated percentages. */
-const outlines = await page.evaluate(() => [...document.querySelectorAll('.pairs figure')].map((figure) => ({
+/* Without targets there are outlines in four slices, whose areas differ from that of the reference by the stated
+ * percentages. */
+supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350', '-o', join(folder, 'plain.html'));
+const { page: plain } = await open(join(folder, 'plain.html'));
+const outlines = await plain.evaluate(() => [...document.querySelectorAll('.pairs figure')].map((figure) => ({
   title: figure.querySelector('figcaption').textContent,
   paths: [...figure.querySelectorAll('path')].map((path) => [path.querySelector('title')?.textContent ?? path.getAttribute('class'), path.getAttribute('d')]),
 })));
@@ -115,6 +139,7 @@ for (const { title, paths } of outlines) {
     assert.ok(Math.abs(100 * (area[posture] / area.before - 1) - percent) < 1, `${title}: ${JSON.stringify(area)}`);
   }
 }
+await close(plain);
 
 /* Each picture has four orientation letters. The picture and its arrow of gravity are rotated to the posture. */
 const shots = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.shot')].map((shot) => [shot.querySelector('img').alt, {

@@ -101,9 +101,11 @@ static double real(const json_t *object, const char *key, size_t index) {
 }
 
 /* Assert that the morph weights given by the formula in `extras` reproduce the positions of
- * supine_deform. The pose multiplies the displacement of lung i along axis a by
- * s[i] + t[i] * bend[a], where bend[a] is a constant of the basis. */
-static void check_pose(const supine_pose *given, const double s[2], const double t[2]) {
+ * supine_deform, at the vertices that remain if the surface was simplified to about `simplify`. The
+ * pose multiplies the displacement of lung i along axis a by s[i] + t[i] * bend[a], where bend[a]
+ * is a constant of the basis. */
+static void check_pose(const supine_pose *given, const double s[2], const double t[2],
+                       size_t simplify) {
   unsigned char *bytes = NULL;
   const unsigned char *numbers = NULL;
   json_t *root = read_glb(&bytes, &numbers);
@@ -117,9 +119,13 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   supine_deform(source, given, xyz);
   assert_int_equal(supine_sh_evaluate(info->band, pose_gravity, y), SUPINE_OK);
   const size_t k = info->mode_count;
-  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
-    const size_t lung = i / 3 >= info->lung_begin[1];
-    const size_t vertex = i / 3 - info->lung_begin[lung];
+  SUPINE_ARENA arena = {0};
+  export_order order = {0};
+  assert_int_equal(supine_export_order_make(info, false, simplify, &arena, &order, NULL),
+                   SUPINE_OK);
+  for (size_t i = 0; i < 3 * order.vertex_count; ++i) {
+    const size_t lung = i / 3 >= order.lung_begin[1];
+    const size_t vertex = i / 3 - order.lung_begin[lung];
     const json_t *mesh = child(root, "meshes", lung);
     const json_t *primitive = child(mesh, "primitives", 0);
     const json_t *own = json_object_get(json_object_get(mesh, "extras"), "supine");
@@ -136,7 +142,7 @@ static void check_pose(const supine_pose *given, const double s[2], const double
            component(root, numbers, number(child(primitive, "targets", j), "POSITION"), vertex,
                      i % 3);
     }
-    assert_true(fabs(x - (double)xyz[i]) < 1e-4);
+    assert_true(fabs(x - (double)xyz[3 * order.vertex[i / 3] + i % 3]) < 1e-4);
   }
   supine_basis_close(source);
   json_decref(root);
@@ -144,8 +150,8 @@ static void check_pose(const supine_pose *given, const double s[2], const double
   free(xyz);
 }
 
-TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
-  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
+/* Assert that the file `out` morphs to the positions of the library. */
+static void check_morphs(size_t simplify) {
   supine_basis *source = NULL;
   supine_pose pose;
   assert_int_equal(supine_basis_open(basis, &source, NULL), SUPINE_OK);
@@ -161,8 +167,24 @@ TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
     t[lung] = (gain[2] - gain[0]) / info->bend[2];
   }
   assert_true(fabs(s[0] - s[1]) > 0.01 * fabs(s[0]));
-  check_pose(&pose, s, t);
+  check_pose(&pose, s, t, simplify);
   supine_basis_close(source);
+}
+
+TEST(test_glb_bent_basis_morphs_to_positions_of_library) {
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain"), 0);
+  check_morphs(0);
+}
+
+TEST(test_glb_simplified_morphs_to_positions_of_library) {
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--plain", "--simplify", "60"), 0);
+  assert_says(text, "simplified from ");
+  check_morphs(60);
+}
+
+TEST(test_glb_compressed_names_remedy_for_model_viewer) {
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
+  assert_says(text, "for model-viewer, set its meshoptDecoderLocation or use --plain");
 }
 
 /* Find the range of each morph weight of the first lung, in `tried` directions of gravity and at

@@ -7,6 +7,7 @@
 #include <packed.h>
 #include <template.h>
 
+#include "base/number.h"
 #include "tests/helpers/export_helpers.h"
 
 static char *folder;
@@ -172,7 +173,7 @@ TEST(test_page_tensors_equal_basis) {
   const supine_basis_info *s = supine_basis_get_info(opened);
   SUPINE_ARENA arena = {0};
   export_order order = {0};
-  assert_int_equal(supine_export_order_make(s, true, &arena, &order, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
   check_motion(page, s, order.vertex);
   check_corners(page, order.corners, 3 * s->triangle_count);
   check_tensor(page, "modes", s->modes, 6 * 16 * sizeof(double));
@@ -208,7 +209,7 @@ TEST(test_page_of_vector_basis_coefficients_equal_basis) {
   export_order order = {0};
   assert_int_equal(supine_basis_open(vector, &opened, NULL), SUPINE_OK);
   const supine_basis_info *s = supine_basis_get_info(opened);
-  assert_int_equal(supine_export_order_make(s, true, &arena, &order, NULL), SUPINE_OK);
+  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
   const size_t n = s->vertex_count;
   const size_t k = s->mode_count;
   const size_t stride = (k + 1) / 2 * 2;
@@ -224,6 +225,69 @@ TEST(test_page_of_vector_basis_coefficients_equal_basis) {
   supine_basis_close(opened);
   free(counts);
   free(page);
+}
+
+/* Return the number after `before` in the text that the command printed. */
+static double number_after(const char *printed, const char *before) {
+  const char *at = strstr(printed, before);
+  assert_non_null(at);
+  return supine_number_parse(at + strlen(before), NULL);
+}
+
+TEST(test_page_simplified_vertices_are_original_rows) {
+  char lungs[256];
+  char whole[256];
+  (void)snprintf(lungs, sizeof lungs, "%s/lungs.ply", folder);
+  (void)snprintf(whole, sizeof whole, "%s/whole", folder);
+  assert_int_equal(
+      COMMAND_RUN(&supine_command_phantom, KEPT_BOTH, text, "--vertices", "3000", "-o", lungs), 0);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_BOTH, text, lungs, "--held-out",
+                               "9", "-o", whole),
+                   0);
+  assert_int_equal(EXPORT_RUN(text, whole, "-o", out, "--simplify", "600"), 0);
+  char *page = read_page();
+  supine_basis *opened = NULL;
+  SUPINE_ARENA arena = {0};
+  export_order order = {0};
+  assert_int_equal(supine_basis_open(whole, &opened, NULL), SUPINE_OK);
+  const supine_basis_info *s = supine_basis_get_info(opened);
+  assert_int_equal(supine_export_order_make(s, true, 600, &arena, &order, NULL), SUPINE_OK);
+  assert_true(order.vertex_count > 500 && order.vertex_count < 700);
+  assert_int_equal(number_of(page, "vertices"), order.vertex_count);
+  assert_int_equal(number_of(page, "wholeVertices"), s->vertex_count);
+  const size_t n = order.vertex_count;
+  const size_t stride = (s->mode_count + 1) / 2 * 2;
+  const double unit = number_of(page, "unit");
+  int16_t *counts = take_rows(page, "coefficients", n, stride);
+  for (size_t i = 0; i < n * s->mode_count; ++i) { /* each kept vertex has the row it had */
+    const size_t v = order.vertex[i / s->mode_count];
+    const float *d = s->direction + 3 * v;
+    const double reach = hypot(hypot((double)d[0], (double)d[1]), (double)d[2]);
+    const double c = (double)s->coefficients[v * s->mode_count + i % s->mode_count] * reach;
+    assert_true(fabs(counts[i / s->mode_count * stride + i % s->mode_count] * unit - c) <=
+                0.5001 * unit);
+  }
+  for (size_t lung = 0; lung < s->lung_count; ++lung) { /* corners are vertices of the lung */
+    for (size_t i = order.corner_begin[lung]; i < order.corner_begin[lung + 1]; ++i) {
+      assert_in_range(order.corners[i], order.lung_begin[lung], order.lung_begin[lung + 1] - 1);
+    }
+    for (size_t i = order.lung_begin[lung]; i < order.lung_begin[lung + 1]; ++i) {
+      assert_in_range(order.vertex[i], s->lung_begin[lung], s->lung_begin[lung + 1] - 1);
+    }
+  }
+  double rms = 0.0;
+  double largest = 0.0;
+  assert_int_equal(supine_export_order_error(s, &order, &rms, &largest, NULL), SUPINE_OK);
+  assert_true(rms > 0.0 && rms < 1.0 && largest > rms && largest < 8.0);
+  assert_true(fabs(number_after(text, " vertices: ") - rms) < 0.00051);
+  supine_basis_close(opened);
+  free(counts);
+  free(page);
+}
+
+TEST(test_page_simplified_to_more_vertices_refused) {
+  assert_int_equal(EXPORT_RUN(text, basis, "-o", out, "--simplify", "100000"), 1);
+  assert_says(text, "vertices: simplify to fewer than that");
 }
 
 TEST_GROUP(setup, teardown)

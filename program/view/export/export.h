@@ -19,7 +19,17 @@ typedef struct export_glb_options {
                     in the lying postures */
   double breath; /**< tidal volume, mL; during the breath, weights of morph targets stay between
                     0 and 1, to which viewers clamp them */
+  size_t simplify; /**< approximate number of vertices to keep; 0 to keep all */
 } export_glb_options;
+
+/** What was written. */
+typedef struct export_written {
+  size_t bytes;    /**< size of the .glb file */
+  size_t vertices; /**< number of vertices in the file */
+  double rms; /**< RMS distance of the basis' vertices from the surface in the file, mm; 0 unless
+                 it is simplified */
+  double largest; /**< largest such distance, mm */
+} export_written;
 
 /** Write a glTF 2.0 binary file. Each lung is a mesh whose morph targets j move vertex i to
  *
@@ -29,14 +39,15 @@ typedef struct export_glb_options {
  * file and of each lung's mesh say how to compute the weights from gravity and volume. Targets also
  * change normals. The node "patient" lies on a table and rotates about the centre of the lungs; an
  * arrow shows gravity. Units are metres, y points up.
- * @param bytes  output: size of the file */
+ * @param written  output */
 supine_status supine_export_glb_write(const char *path, const supine_basis *basis,
-                                      const export_glb_options *options, size_t *bytes,
+                                      const export_glb_options *options, export_written *written,
                                       supine_error *error);
 
 /** Options of the exported HTML page. */
 typedef struct export_page {
   double breath;                             /**< tidal volume, mL */
+  size_t simplify;                           /**< approximate number of vertices; 0 to keep all */
   const supine_options_reference_pose *from; /**< [from_count] states from which displacements can
                                         be measured; the first is shown */
   size_t from_count;                         /**< at least 1 */
@@ -50,8 +61,9 @@ typedef struct export_page {
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a
  * network. Vertices, displacements and triangles are compressed by meshoptimizer. In lungs up to
  * 650 mm long, positions err by at most 0.02 mm. A write error sets the error indicator of `file`.
- */
+ * @param written  output */
 supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
-                                       const export_page *shown, supine_error *error);
+                                       const export_page *shown, export_written *written,
+                                       supine_error *error);
 
 #endif

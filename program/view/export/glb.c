@@ -21,9 +21,10 @@ static supine_status prepare(glb *g, supine_error *error) {
   g->normals = supine_arena_take(&g->arena, n, 3 * sizeof *g->normals);
   g->added = supine_arena_take(&g->arena, n * g->targets.count, 3 * sizeof *g->added);
   SUPINE_TRY(supine_arena_check(&g->arena, error, "%zu vertices", n));
-  SUPINE_TRY(supine_export_order_make(g->info, !g->options->plain, &g->arena, &g->order, error));
-  return supine_export_targets_normals(&g->targets, g->options->plain ? NULL : g->order.vertex,
-                                       g->normals, g->added, error);
+  SUPINE_TRY(supine_export_order_make(g->info, !g->options->plain, g->options->simplify, &g->arena,
+                                      &g->order, error));
+  return supine_export_targets_normals(&g->targets, &g->order, g->options->plain, g->normals,
+                                       g->added, error);
 }
 
 /* Append the patient with the lungs, the animations, the table under the patient and the arrow of
@@ -124,7 +125,7 @@ static void free_glb(glb **g) {
 }
 
 supine_status supine_export_glb_write(const char *path, const supine_basis *basis,
-                                      const export_glb_options *options, size_t *bytes,
+                                      const export_glb_options *options, export_written *written,
                                       supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   SUPINE_REFUSE_IF(info->triangle_count == 0, error, SUPINE_ERROR_MESH,
@@ -148,5 +149,11 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
                       g->views, "accessors", g->accessors, "buffers");
   SUPINE_TRY(supine_export_targets_choose(basis, options->breath, &g->targets, error));
   g->step = options->plain ? 1 : fmax(step_min_mm, g->targets.half_extent / (INT16_MAX / 2));
-  return make_and_write(g, path, bytes, error);
+  *written = (export_written){.bytes = 0};
+  SUPINE_TRY(make_and_write(g, path, &written->bytes, error));
+  written->vertices = g->order.vertex_count;
+  if (options->simplify > 0) {
+    SUPINE_TRY(supine_export_order_error(info, &g->order, &written->rms, &written->largest, error));
+  }
+  return SUPINE_OK;
 }

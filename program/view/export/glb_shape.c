@@ -58,7 +58,7 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
 
 /* Append one lung's part of an array over all vertices; return the index of the accessor. */
 static json_int_t put(glb *g, size_t lung, glb_kind kind, const void *rows) {
-  const size_t *begin = g->info->lung_begin + lung;
+  const size_t *begin = g->order.lung_begin + lung;
   return supine_export_glb_put(g, kind, rows, g->order.vertex + begin[0], begin[1] - begin[0]);
 }
 
@@ -90,17 +90,25 @@ static json_int_t put_changes(glb *g, size_t lung, size_t j) {
       return put(g, lung, GLB_NORMAL_CHANGES, added);
     }
   }
-  return supine_export_glb_put_zeros(g, GLB_NORMAL_CHANGES, begin[1] - begin[0]);
+  const size_t *written = g->order.lung_begin + lung;
+  return supine_export_glb_put_zeros(g, GLB_NORMAL_CHANGES, written[1] - written[0]);
 }
 
-/* Append a lung's triangles. Their vertex indices count from the lung's first vertex. */
+/* Append a lung's triangles. Their vertex indices count from the lung's first vertex in the
+ * file. */
 static json_int_t put_corners(glb *g, size_t lung) {
   const size_t *begin = g->order.corner_begin + lung;
-  uint32_t *corners = g->order.corners + begin[0];
-  for (size_t i = 0; i < begin[1] - begin[0]; ++i) {
-    corners[i] -= (uint32_t)g->info->lung_begin[lung];
+  const size_t count = begin[1] - begin[0];
+  SUPINE_ARENA arena = {0};
+  uint32_t *corners = supine_arena_take(&arena, count, sizeof *corners);
+  if (corners == NULL) {
+    g->status = SUPINE_ERROR_MEMORY;
+    return 0;
   }
-  return supine_export_glb_put(g, GLB_CORNERS, corners, NULL, begin[1] - begin[0]);
+  for (size_t i = 0; i < count; ++i) {
+    corners[i] = g->order.corners[begin[0] + i] - (uint32_t)g->order.lung_begin[lung];
+  }
+  return supine_export_glb_put(g, GLB_CORNERS, corners, NULL, count);
 }
 
 json_int_t supine_export_glb_add(glb *g, size_t lung) {

@@ -102,7 +102,7 @@ typedef void fill_row(const page *p, const supine_basis_info *info, size_t verte
  * the columns of a vertex on an axis; they are padded to an even number. */
 static supine_status add_rows(page *p, const char *name, const supine_basis_info *info, size_t axes,
                               size_t columns, fill_row *fill) {
-  const size_t n = info->vertex_count;
+  const size_t n = info == p->info ? p->order.vertex_count : info->vertex_count;
   const size_t stride = (columns + 1) / 2 * 2;
   size_t size = 0;
   SUPINE_ARENA arena = {0};
@@ -118,12 +118,11 @@ static supine_status add_rows(page *p, const char *name, const supine_basis_info
   return add_tensor(p, name, packed, size);
 }
 
-static supine_status add_corners(page *p, const char *name, const supine_basis_info *info,
-                                 const uint32_t *corners) {
+static supine_status add_corners(page *p, const char *name, const uint32_t *corners, size_t count,
+                                 size_t vertices) {
   size_t size = 0;
   SUPINE_ARENA arena = {0};
-  const void *packed = supine_export_pack_corners(&arena, corners, 3 * info->triangle_count,
-                                                  info->vertex_count, &size);
+  const void *packed = supine_export_pack_corners(&arena, corners, count, vertices, &size);
   return add_tensor(p, name, packed, size);
 }
 
@@ -176,6 +175,19 @@ static supine_status add_doubles(page *p) {
   return SUPINE_OK;
 }
 
+/* Add the sums with which the page of a simplified surface computes expected errors. */
+static supine_status add_squares(page *p) {
+  const supine_basis_info *info = p->info;
+  const size_t count = 3 * info->lung_count * info->mode_count * info->mode_count;
+  SUPINE_ARENA arena = {0};
+  double *squares = supine_arena_take(&arena, count, sizeof *squares);
+  if (squares == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  supine_export_squares(info, p->coefficients, squares);
+  return add_tensor(p, "squares", squares, count * sizeof *squares);
+}
+
 /* Return the 256 colours of each colour map as hexadecimal digits. */
 static json_t *colours(void) {
   static const char *const names[SUPINE_COLOURS_COUNT] = {"displacement", "difference"};
@@ -207,11 +219,9 @@ static json_t *describe_inside(const page *p) {
     return json_null();
   }
   json_t *names = json_array();
-  for (size_t i = 0; i < p->shown->names->count; ++i) {
-    (void)json_array_append_new(names, supine_options_json_text(p->shown->names->text[i]));
-  }
   json_t *anatomy = json_array();
   for (size_t i = 0; i < p->shown->names->count; ++i) {
+    (void)json_array_append_new(names, supine_options_json_text(p->shown->names->text[i]));
     if (p->shown->names->anatomy[i] != 0) {
       (void)json_array_append_new(anatomy, json_integer((json_int_t)i));
     }
@@ -270,11 +280,14 @@ static json_t *describe_froms(const page *p) {
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, s:o, s:o, "
+      "{s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, s:o, "
+      "s:o, "
       "s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
-      "vertices", (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
-      "modes", (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector",
-      (int)info->vector, "lungBegin", begins(info, info->lung_begin), "cornerBegin",
+      "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
+      (json_int_t)info->vertex_count, "triangles",
+      (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
+      (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector", (int)info->vector,
+      "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
       begins(info, p->order.corner_begin), "hasResting", (int)info->has_rest, "colours", colours(),
       "breathVolume", p->shown->breath, "metadata", supine_options_json_metadata(p->basis), "title",
       supine_options_json_text(p->shown->title), "middle",
@@ -294,14 +307,19 @@ static supine_status add_tensors(page *p) {
     SUPINE_TRY(add_rows(p, "direction", info, 1, 4, direction_row));
   }
   SUPINE_TRY(add_rows(p, "coefficients", info, axes_of(info), info->mode_count, coefficient_row));
-  SUPINE_TRY(add_corners(p, "triangles", info, p->order.corners));
+  SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],
+                         p->order.vertex_count));
   SUPINE_TRY(add_doubles(p));
+  if (p->shown->simplify > 0) {
+    SUPINE_TRY(add_squares(p));
+  }
   if (inside == NULL) {
     return SUPINE_OK;
   }
   SUPINE_TRY(add_rows(p, "inside-vertices", inside, 1, 3, place_row));
   SUPINE_TRY(add_rows(p, "inside-coefficients", inside, 3, inside->mode_count, coefficient_row));
-  SUPINE_TRY(add_corners(p, "inside-triangles", inside, inside->triangles));
+  SUPINE_TRY(add_corners(p, "inside-triangles", inside->triangles, 3 * inside->triangle_count,
+                         inside->vertex_count));
   return add_tensor(p, "inside-parts", p->shown->names->part,
                     inside->vertex_count * sizeof *p->shown->names->part);
 }
@@ -325,7 +343,8 @@ static void free_page(page *p) {
 }
 
 supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
-                                       const export_page *shown, supine_error *error) {
+                                       const export_page *shown, export_written *written,
+                                       supine_error *error) {
   SUPINE_C_LOCALE;
   SUPINE_FREED_BY(free_page)
   page p = {.basis = basis,
@@ -343,7 +362,12 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
       "with 'supine render', or export the surface of one state with 'supine deform'");
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_TRY(find_coefficients(&p, error));
-  SUPINE_TRY(supine_export_order_make(p.info, true, &p.arena, &p.order, error));
+  SUPINE_TRY(supine_export_order_make(p.info, true, shown->simplify, &p.arena, &p.order, error));
+  *written = (export_written){.vertices = p.order.vertex_count};
+  if (shown->simplify > 0) {
+    SUPINE_TRY(
+        supine_export_order_error(p.info, &p.order, &written->rms, &written->largest, error));
+  }
   find_steps(&p);
   if (add_tensors(&p) != SUPINE_OK) {
     return supine_error_memory(error, "the page");

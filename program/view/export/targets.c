@@ -197,22 +197,24 @@ static void make_unit(const export_targets *targets, float *base, float *added) 
  * at the targets' `weights` is `base` plus the sum of weight times change. Correct `base`, so that
  * this normal stays as it was. */
 static void round_changes(const export_targets *targets, double (*weights)[EXPORT_TARGETS_MAX],
-                          const uint32_t *order, float *base, float *added) {
+                          const export_order *order, float *base, float *added) {
   /* A component that differs by at most this from that of the previous vertex becomes equal. */
   static const float near = 2.0F / INT8_MAX;
   const supine_basis_info *info = targets->info;
-  for (size_t i = 0, lung = 0; i < info->vertex_count; ++i) {
-    lung += i == info->lung_begin[lung + 1];
-    float *b = base + 3 * (size_t)order[i];
+  for (size_t i = 0, lung = 0; i < order->vertex_count; ++i) {
+    lung += i == order->lung_begin[lung + 1];
+    const size_t vertex = order->vertex[i];
+    float *b = base + 3 * vertex;
     for (size_t axis = 0; axis < 3; ++axis) {
       for (size_t j = 0; j < targets->count; ++j) {
         float *rows = added + 3 * j * info->vertex_count + axis;
-        const float given = rows[3 * (size_t)order[i]];
-        const float before = i > info->lung_begin[lung] ? rows[3 * (size_t)order[i - 1]] : 2;
+        const float given = rows[3 * vertex];
+        const float before =
+            i > order->lung_begin[lung] ? rows[3 * (size_t)order->vertex[i - 1]] : 2;
         const float own = rintf(INT8_MAX * fmaxf(-1, fminf(1, given))) / INT8_MAX;
         const float kept = fabsf(given - before) <= near ? before : own;
         b[axis] += (float)weights[lung][j] * (given - kept);
-        rows[3 * (size_t)order[i]] = kept;
+        rows[3 * vertex] = kept;
       }
     }
     const float length = hypotf(hypotf(b[0], b[1]), b[2]);
@@ -222,8 +224,9 @@ static void round_changes(const export_targets *targets, double (*weights)[EXPOR
   }
 }
 
-supine_status supine_export_targets_normals(const export_targets *targets, const uint32_t *order,
-                                            float *base, float *added, supine_error *error) {
+supine_status supine_export_targets_normals(const export_targets *targets,
+                                            const export_order *order, bool exact, float *base,
+                                            float *added, supine_error *error) {
   static const double supine[3] = {0, 1, 0};
   static const double step = 0.2; /* change of a weight for central differences */
   /* Changes of a lung's normals by a morph target are set to 0 if their RMS is less, radians. */
@@ -254,7 +257,7 @@ supine_status supine_export_targets_normals(const export_targets *targets, const
         d[i] = (d[i] - below[i]) / (float)(2 * step);
         sum += (double)d[i] * (double)d[i];
       }
-      const bool seen = order == NULL || sum > least * least * (double)(end - begin) / 3;
+      const bool seen = exact || sum > least * least * (double)(end - begin) / 3;
       for (size_t i = begin; i < end; ++i) {
         d[i] = seen ? d[i] : 0;
         base[i] -= (float)weights[lung][j] * d[i];
@@ -262,7 +265,7 @@ supine_status supine_export_targets_normals(const export_targets *targets, const
     }
   }
   make_unit(targets, base, added);
-  if (order != NULL) {
+  if (!exact) {
     round_changes(targets, weights, order, base, added);
   }
   return SUPINE_OK;

@@ -6,6 +6,8 @@
 
 #include <supine/runtime.h>
 
+#include "program/view/export/packed.h"
+
 enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
 
 /** Offset and unit of each morph target of one lung.
@@ -65,10 +67,11 @@ void supine_export_targets_base(const export_targets *targets, size_t lung, size
 /** Compute the normals `base` [N, 3] of the base mesh, and the change of the normals by each morph
  * target at weight 1, `added` [targets->count, N, 3]. Both linearise the normals of the deformed
  * surface about the supine posture.
- * @param order  [N] order in which the file stores vertices. `added` is then rounded so that it
- *               compresses well in this order, and is 0 for a target that turns a lung's normals
- *               by less than 2 degrees (RMS). NULL to keep `added` exact */
-supine_status supine_export_targets_normals(const export_targets *targets, const uint32_t *order,
-                                            float *base, float *added, supine_error *error);
+ * @param order  order in which the file stores vertices
+ * @param exact  false to round `added` so that it compresses well in this order, and to set it to 0
+ *               for a target that turns a lung's normals by less than 2 degrees (RMS) */
+supine_status supine_export_targets_normals(const export_targets *targets,
+                                            const export_order *order, bool exact, float *base,
+                                            float *added, supine_error *error);
 
 #endif

@@ -9,6 +9,7 @@ uniform mat4 toEye;
 uniform mat4 projection;
 uniform vec4 lens;
 uniform float chosen; // index of the chosen structure
+uniform float tint;   // index of the colour; -1: 1 for the chosen structure, 0 for others
 uniform float radius; // radius of a ball, mm
 out vec3 eye;
 out vec3 facing;
@@ -21,7 +22,7 @@ void main() {
   vec4 at = toEye * vec4(body, 1.0);
   eye = at.xyz;
   facing = mat3(toEye) * normal;
-  value = number == chosen ? 1.0 : 0.0;
+  value = tint >= 0.0 ? tint : (number == chosen ? 1.0 : 0.0);
   part = uint(number);
   vec4 clip = projection * at;
   gl_Position = vec4((clip.xy - lens.xy * clip.w) * lens.zw, clip.zw);

@@ -41,7 +41,8 @@ function distancesOf(basis, after, before) {
 }
 
 /** Return, for each lung and axis, the sums over its vertices of the products of their displacements by two modes at
- * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. */
+ * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. The page of a
+ * simplified surface has those of the whole one. */
 function squaresOf(basis) {
   const { modes, vertices } = basis;
   const sums = new Float64Array(basis.lungs * 3 * modes * modes);
@@ -60,7 +61,7 @@ function squaresOf(basis) {
 /** Return the RMS over the vertices of the surface of their distance between two states of the lungs, mm, without a pass
  * over the vertices. */
 function rmsBetween(basis, now, from) {
-  basis.squares ??= squaresOf(basis);
+  basis.squares ??= basis.wholeVertices > basis.vertices ? takeTensor('squares', Float64Array) : squaresOf(basis);
   const { modes, squares } = basis;
   let sum = 0;
   for (let row = 0, at = 0; row < 3 * basis.lungs; ++row) {
@@ -144,7 +145,18 @@ function targetOf(inside, part, moved) {
 
 /** Return whether a displacement exceeds its expected error. */
 const isTold = ({ mm, error }) => error === null || mm > error;
-const UNTOLD = 'no change that the model can tell';
+/** Return what stands beside a distance that is within its expected error, mm. */
+const withinWords = (error) => `within its error of ${error.toFixed(1)}`;
+
+/** Return the index of the target to tell of first: that with the largest displacement, in multiples of its expected
+ * error. Targets come before anatomy. */
+function firstTarget(inside, moved) {
+  const ratios = inside.names.map((_, part) => {
+    const { mm, error } = inside.members[part].length ? targetOf(inside, part, moved) : { mm: 0, error: 1 };
+    return [inside.anatomy.includes(part) ? 0 : 1, mm / (error ?? 1)];
+  });
+  return ratios.reduce((best, [kind, ratio], part) => (kind > ratios[best][0] || (kind === ratios[best][0] && ratio > ratios[best][1]) ? part : best), 0);
+}
 
 /** Return a displacement in words, with at most `most` directions and the largest first: "12 to the feet, 7 to the
  * front". With gravity, a direction along it is marked "(up)" or "(down)". */
@@ -187,7 +199,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
   if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
   const half = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
-  if (!isTold({ mm, error })) return { before: `${where}${who}: ${UNTOLD} from ${name}.`, told: '', after: '', error: '', meaning: `Computed: ${mm.toFixed(1)} mm, with an expected error of ${error.toFixed(1)} mm. ${half}` };
+  if (!isTold({ mm, error })) return { before: `${where}${who} moves ${mm.toFixed(1)} mm from ${name}, ${withinWords(error)}: no change that the model can tell.`, told: '', after: '', error: '', meaning: half };
   const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
   return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning: half };
 }
@@ -207,11 +219,11 @@ function writeSentence(element, sentence) {
   }));
 }
 
-/** Return the second line of a posture's card: "13.9 mm, 12 to the feet", or "within the error". */
+/** Return the second line of a posture's card: "13.9 mm, 12 to the feet", or "3.1 mm, error 5.4". */
 function answerOf(moved, target) {
   const told = target ?? { mm: moved.mean, error: moved.error };
   if (moved.largest < 0.05) return 'reference';
-  if (!isTold(told)) return `${told.mm.toFixed(1)} mm, within the error`;
+  if (!isTold(told)) return `${told.mm.toFixed(1)} mm, error ${told.error.toFixed(1)}`;
   return `${told.mm.toFixed(1)} mm${!target ? ' on average' : told.mm < 1 ? '' : `, ${wayWords(target.move, 1)}`}`;
 }
 

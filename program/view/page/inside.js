@@ -3,6 +3,7 @@
 // an axis by the sum over the modes of weight times fields[axis][vertex][mode], times a factor of its lung ("gain").
 
 const BALL_RADIUS = 7; // radius of the ball drawn at a point, mm
+const DOT_RADIUS = 1.5; // radius of the balls drawn at the points of anatomy, mm
 
 /** Read the parts inside the lungs from the page. Sort points before meshes, so that each kind needs one draw call. */
 function takeInside({ inside, modes: k, placeUnit, middle }) {
@@ -13,10 +14,13 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
   of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // as in a mesh: sorting must not split a rigid part
-  const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || a - b);
+  const large = new Set(inside.anatomy);
+  const isLarge = (vertex) => Number(large.has(of[vertex]));
+  const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || isLarge(a) - isLarge(b) || a - b);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
   inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
+  inside.balls = order.subarray(0, inside.points).reduce((sum, vertex) => sum + 1 - isLarge(vertex), 0); // points of targets, which come first
   inside.reference = new Float32Array(4 * n); // reference position, mm, and lung
   inside.fields = new Float32Array(3 * k * n);
   inside.part = new Float32Array(n);
@@ -27,7 +31,15 @@ function takeInside({ inside, modes: k, placeUnit, middle }) {
     inside.part[to] = of[from];
     inside.members[of[from]].push(to);
   });
-  inside.corners = corners.map((corner) => rank[corner]);
+  const meshOf = (part) => {
+    const own = [];
+    for (let t = 0; t < corners.length; t += 3) if (part === null ? !isLarge(corners[t]) : of[corners[t]] === part) own.push(...corners.subarray(t, t + 3));
+    return own.map((corner) => rank[corner]);
+  };
+  const meshes = [null, ...inside.anatomy].map(meshOf); // of all targets, then of each structure that is anatomy
+  inside.corners = Uint32Array.from(meshes.flat());
+  inside.targetCorners = meshes[0].length;
+  inside.shells = inside.anatomy.map((part, i) => ({ part, colour: i % ANATOMY_COLOURS.length, begin: meshes.slice(0, i + 1).reduce((sum, { length }) => sum + length, 0), count: meshes[i + 1].length })).filter(({ count }) => count > 0);
   inside.normals = normalsOf(inside);
 }
 
@@ -93,6 +105,21 @@ function insidePlace(inside, moment, vertex) {
   return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
 }
 
+/** Return the CSS colour of a part that is anatomy; undefined for a target. */
+const anatomyColour = ({ anatomy }, part) => (anatomy.includes(part) ? ANATOMY_COLOURS[anatomy.indexOf(part) % ANATOMY_COLOURS.length] : undefined);
+
+/** Return the positions of all vertices of anatomy, mm, in the state `moment` of the lungs; 0 for those of targets. */
+function anatomyPlaces(inside, moment) {
+  const places = new Float32Array(3 * inside.vertices);
+  for (const { part } of inside.shells) insidePlaces(inside, moment, part).forEach((place, i) => places.set(place, 3 * inside.members[part][i]));
+  return places;
+}
+
+/** Return the lines along which the meshes of anatomy cross the plane at `at` mm on an axis: for each mesh its colour and
+ * the result of linesAcross. `places` is the result of anatomyPlaces. */
+const anatomyLines = ({ shells, corners, vertices }, places, axis, at) => shells.map(({ colour, begin, count }) => (
+  { colour: ANATOMY_COLOURS[colour], lines: linesAcross({ corners: corners.subarray(begin, begin + count), vertices }, places, axis, at) }));
+
 /** Return the vertex of a part that is nearest to the position `place`, mm. */
 function insideNearest(inside, part, moment, place) {
   let [best, least] = [inside.members[part][0], Infinity];
@@ -134,6 +161,8 @@ class TargetTable {
     head.scope = 'row';
     button.type = 'button';
     button.textContent = this.inside.names[part] || '(no name)';
+    const colour = anatomyColour(this.inside, part);
+    if (colour) button.style.setProperty('--own', colour);
     button.addEventListener('click', () => this.choose(part));
     head.append(button);
     row.append(head, ...cells);
@@ -156,7 +185,7 @@ class TargetTable {
       const target = targetOf(this.inside, part, moved);
       const told = isTold(target);
       row.classList.toggle('untold', !told);
-      const texts = [`${target.mm.toFixed(1)} mm`, moved.largest < 0.05 ? 'the reference' : told ? wayWords(target.move, 3, moved.now.gravity) : UNTOLD, target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`];
+      const texts = [`${target.mm.toFixed(1)} mm`, moved.largest < 0.05 ? 'the reference' : told ? wayWords(target.move, 3, moved.now.gravity) : withinWords(target.error), target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`];
       cells.forEach((cell, i) => { if (cell.textContent !== texts[i]) cell.textContent = texts[i]; });
     }
   }

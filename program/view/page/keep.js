@@ -17,7 +17,7 @@ function linkOf(state) {
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
     camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
-    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '', probes: state.probes.join('.'), target: state.chosen ? String(state.chosen) : '',
+    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '', probes: state.probes.join('.'), target: state.picked ? String(state.chosen) : '',
     since: state.basis.froms.length > 1 ? String(state.basis.froms.indexOf(state.from)) : '', inside: state.basis.inside && !state.inside ? '0' : '',
   };
   return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
@@ -54,7 +54,8 @@ function takeLink(text, state) {
   if (slices.length === 3 && slices.every((x, axis) => x > state.body.low[axis] && x < state.body.high[axis])) state.slices = slices;
   state.inside = Boolean(state.basis.inside) && link.get('inside') !== '0';
   const target = numbers('target')[0];
-  state.chosen = Number.isInteger(target) ? within(target, 0, (state.basis.inside?.names.length ?? 1) - 1, 0) : 0;
+  state.picked = Number.isInteger(target) && within(target, 0, (state.basis.inside?.names.length ?? 1) - 1, -1) >= 0;
+  if (state.picked) state.chosen = target;
   state.from = state.basis.froms[numbers('since')[0] ?? 0] ?? state.basis.froms[0];
   state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
 }

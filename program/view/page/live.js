@@ -45,7 +45,10 @@ window.supineLive = (() => {
     posed = age < 0 ? NaN : performance.now() - 1000 * age;
     tellAge();
     const page = window.supine;
-    if (!page) return;
+    if (!page) { // the page still reads the lungs
+      requestAnimationFrame(() => show({ gravity, above, age }));
+      return;
+    }
     moments += 1;
     page.state.playing = false;
     page.state.live = true;

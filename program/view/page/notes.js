@@ -13,6 +13,12 @@ function project(pane, [x, y, z], ratio) {
   return [(left + ((ndc[0] + 1) / 2) * width) / ratio, (pane.canvasHeight - bottom - ((ndc[1] + 1) / 2) * height) / ratio];
 }
 
+/** Return a name as the picture shows it: cut at a character if it has more than `longest`. */
+function shortName(name, longest = 28) {
+  const characters = Array.from(new Intl.Segmenter().segment(name), ({ segment }) => segment);
+  return characters.length > longest ? `${characters.slice(0, longest - 1).join('')}\u2026` : name;
+}
+
 /** Draw a line with the head of an arrow at its end. */
 function drawArrow(context, [x, y], [u, v], head) {
   const size = Math.hypot(u - x, v - y);
@@ -62,7 +68,7 @@ class Notes {
 
   text(words, x, y, { align = 'left', colour = '--ink', font = '13px' } = {}) {
     const { context } = this;
-    Object.assign(context, { textAlign: align, textBaseline: 'middle', font: `${font} system-ui, sans-serif`, lineJoin: 'round', strokeStyle: css('--paper-solid'), fillStyle: css(colour) });
+    Object.assign(context, { textAlign: align, textBaseline: 'middle', font: `${font} system-ui, sans-serif`, lineJoin: 'round', strokeStyle: css('--paper-solid'), fillStyle: colour.startsWith('--') ? css(colour) : colour });
     context.lineWidth = 3;
     context.strokeText(words, x, y);
     context.fillText(words, x, y);
@@ -81,16 +87,24 @@ class Notes {
     this.text(word, x, y + from, { align: 'center', font: '12px' });
   }
 
-  /** Draw a target's name, and a line from it to the target. A name that would cover a taken box moves down. */
-  name(target, at, lines, width) {
+  /** Draw a target's name, in a colour, and a line from it to the target. A name that would cover a taken box moves
+   * down, up or to the other side. */
+  name(at, lines, { width, height }, colour) {
     const { context, taken } = this;
-    context.font = '600 13px system-ui, sans-serif';
-    const wide = Math.max(...lines.map((line) => context.measureText(line).width));
-    const side = at[0] + 70 + wide < width ? 1 : -1;
+    const wide = Math.max(...lines.map((line, i) => {
+      context.font = `${i ? '12px' : '600 13px'} system-ui, sans-serif`;
+      return context.measureText(line).width;
+    }));
+    let side = at[0] + 70 + wide < width ? 1 : -1;
     const place = [at[0] + side * 60, at[1] + 4];
     const box = () => [place[0] - (side < 0 ? wide : 0), place[1] - 9, place[0] + (side > 0 ? wide : 0), place[1] + 16 * lines.length - 7];
     const covers = ([left, top, right, bottom]) => left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1];
-    for (let steps = 0; steps < 1000 && taken.some(covers); ++steps) place[1] += 8;
+    const fits = () => !taken.some(covers) && box()[0] > 0 && box()[1] > 0 && box()[3] < height;
+    for (let steps = 1; steps < 200 && !fits(); ++steps) { // near the target on either side first, then farther
+      if (steps % 2 === 0) side = -side;
+      place[0] = at[0] + side * 60;
+      place[1] = at[1] + 4 + 8 * Math.ceil(steps / 4) * (steps % 4 < 2 ? 1 : -1);
+    }
     taken.push(box());
     context.strokeStyle = css('--soft');
     context.lineWidth = 1;
@@ -98,7 +112,7 @@ class Notes {
     context.moveTo(at[0] + side * 6, at[1]);
     context.lineTo(place[0] - side * 5, place[1]);
     context.stroke();
-    lines.forEach((line, i) => this.text(line, place[0], place[1] + 16 * i, { align: side > 0 ? 'left' : 'right', font: i ? '12px' : '600 13px' }));
+    lines.forEach((line, i) => this.text(line, place[0], place[1] + 16 * i, { align: side > 0 ? 'left' : 'right', colour: i ? '--ink' : colour, font: i ? '12px' : '600 13px' }));
   }
 
   /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside it or, if the
@@ -138,11 +152,11 @@ class Notes {
     context.restore();
     taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 22 : 6)]);
     if (narrow) {
-      this.text(target.name, width - 10, middle[1] + size + 12, { align: 'right', colour: '--change', font: '600 12px' });
+      this.text(shortName(target.name), width - 10, middle[1] + size + 12, { align: 'right', colour: '--change', font: '600 12px' });
       return;
     }
-    const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : UNTOLD.split(/(?<=the) /);
-    const lines = [[target.name, '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
+    const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
+    const lines = [[shortName(target.name, 17), '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
     lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
   }
 }

@@ -93,14 +93,15 @@ class Outlines {
   }
 
   /** Draw the outlines in the state `now`, and dashed outlines in the state `from`, through `target` (see targetOf) or,
-   * if it is null, through the middle of a lung, unless the user has moved the planes. */
+   * if it is null, through the middle of a lung, unless the user has moved the planes. The target is drawn as a ball of
+   * radius `radius`, mm, unless that is 0, and anatomy as contours. */
   show(now, from, target, radius) {
     const { basis, state, kept } = this;
     const [box] = basis.lungBoxes;
     this.planes = planesFor(now.gravity);
     this.at = state.slices ?? target?.at ?? [box.centre[0], basis.torso.centre[1], box.centre[2] - 0.3 * box.half[2]];
     if (kept.from !== from) Object.assign(kept, { from, before: placesOf(basis, from) });
-    if (kept.now !== now) Object.assign(kept, { now, places: placesOf(basis, now) });
+    if (kept.now !== now) Object.assign(kept, { now, places: placesOf(basis, now), large: basis.inside && anatomyPlaces(basis.inside, now) });
     this.planes.forEach((plane, i) => {
       this.draw(i, ...[kept.before, kept.places].map((places) => linesAcross(basis, places, plane.axis, this.at[plane.axis])), target, radius);
       const { axis } = this.planes[1 - i];
@@ -147,7 +148,13 @@ class Outlines {
     path(before);
     context.stroke();
     context.setLineDash([]);
-    if (target) drawTrace(context, place(target.was), place(target.at), radius * scale, 0);
+    for (const { colour, lines } of this.basis.inside ? anatomyLines(this.basis.inside, this.kept.large, axis, this.at[axis]) : []) {
+      path(lines);
+      context.strokeStyle = colour;
+      context.lineWidth = 1.3;
+      context.stroke();
+    }
+    if (target && radius > 0) drawTrace(context, place(target.was), place(target.at), radius * scale, 0);
     const text = (words, x, y, align, colour = '--soft', font = '12px') => {
       [context.textAlign, context.textBaseline, context.fillStyle, context.font] = [align, 'middle', css(colour), `${font} system-ui, sans-serif`];
       context.fillText(words, x, y, width);

@@ -85,7 +85,7 @@ function start() {
       name, distance, state: name, origin: state.kind === 'difference' ? 'pinned' : 'from', box, canvasHeight: canvas.height,
       toEye: rigid(toRoom, offset), turn: toRoom, projection: perspective(VIEW_ANGLE, aspect, Math.max(distance - reach, distance * 0.02), distance + reach),
       gravity, measure: kind.measure, map: kind.map, plain: state.kind === 'plain', range: state.range, fade: [-3.6, -1.2].map((z) => torso.centre[2] + z * torso.half[2]),
-      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, chosen: state.chosen, targetTints: ['accent', 'change'].map((tint) => rgb(themes.stage[tint])), contours: state.contours && state.kind !== 'plain',
+      pixel: (2 * tangent * distance * ratio()) / box[3], inside: state.inside, chosen: state.chosen, targetTints: [...['accent', 'change'].map((tint) => themes.stage[tint]), ...ANATOMY_COLOURS].map(rgb), contours: state.contours && state.kind !== 'plain',
       dark: rgb(themes.stage.back)[1] < 0.5, ink: [...rgb(themes.stage.ink), 1], radius, rise: riseOf(gravity),
       opacity: state.opacity, wires: state.wires, ghost: state.ghost, arrows: state.arrows,
       tableToEye, tableTint: [...rgb(themes.stage.table), 0.3],
@@ -105,14 +105,14 @@ function start() {
   /** Return the matrix from the box [-1, 1]^3 to the table under the patient's body, in camera coordinates; null if the
    * patient stands. The table tilts with the patient; `length` is half its length, mm. */
   function tableOf(gravity, toRoom, offset, length) {
-    const flat = Math.hypot(gravity[0], gravity[1]);
-    if (flat <= 0.4) return null;
-    const down = [gravity[0] / flat, gravity[1] / flat, 0];
+    const down = downOf(gravity);
+    if (!down) return null;
     const { radius } = state.body;
     const { centre, half } = basis.torso;
-    const far = Math.hypot(1.25 * half[0] * down[0], 1.1 * half[1] * down[1]) + 0.12 * radius;
+    const wide = Math.hypot(2 * half[0] * down[1], 1.5 * half[1] * down[0]); // half the table's width, mm
+    const far = reachDown(basis.torso, armsOf(basis.torso, down), down) + 0.12 * radius;
     const at = rotate(toRoom, centre.map((c, i) => c + down[i] * far)).map((x, i) => x + offset[i]);
-    const columns = [cross(down, [0, 0, 1]).map((x) => 0.5 * radius * x), [0, 0, length], down.map((x) => 0.12 * radius * x)].map((v) => rotate(toRoom, v));
+    const columns = [cross(down, [0, 0, 1]).map((x) => wide * x), [0, 0, length], down.map((x) => 0.12 * radius * x)].map((v) => rotate(toRoom, v));
     return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...at, 1]);
   }
 
@@ -213,6 +213,7 @@ function start() {
 
   const choose = (part) => {
     state.chosen = part;
+    state.picked = true;
     table.press();
     told = null;
     redraw();
@@ -234,21 +235,27 @@ function start() {
     notes.context = freshContext(notes.canvas);
     notes.taken = [];
     const small = width < 520;
-    notes.gravity(pane, small ? 34 : width - 44, height - (small ? 100 : 92));
+    const [x, y] = [small ? 34 : width - 44, height - (small ? 100 : 92)];
+    notes.gravity(pane, x, y);
+    notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
     if (inside && state.inside && state.moment && !state.turning) {
       const terms = termsBetween(basis, state.moment, originMoment());
       const few = inside.names.length <= 6;
       for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
         if (!few && part !== state.chosen) break;
+        if (!inside.members[part].length) continue;
         const target = targetOf(inside, part, terms);
-        if (part === state.chosen && target.mm > 0.05) notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
+        const large = anatomyColour(inside, part);
+        if (part === state.chosen && target.mm > 0.05 && !large) notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
         else {
           const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio()));
           if (!was || !at) continue;
           notes.context.strokeStyle = notes.context.fillStyle = css('--ink');
           notes.context.lineWidth = 1.5;
-          if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
-          notes.name(target, at, [target.name, ...(small ? [] : [`${target.mm.toFixed(1)} mm`]), ...(small || isTold(target) ? [] : [UNTOLD])], width);
+          if (!large && Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
+          const moves = `${target.mm.toFixed(1)} mm${isTold(target) ? '' : `, ${withinWords(target.error)}`}`;
+          const says = target.mm < 0.05 ? 'the reference' : moves;
+          notes.name(at, [shortName(target.name), ...(small ? [] : [says])], { width, height }, large ?? '--ink');
         }
       }
     }
@@ -302,6 +309,10 @@ function start() {
     const moment = momentFor(basis, state.gravity, depth);
     if (moment.folds) return;
     const moved = movedBetween(basis, moment, state.from);
+    if (inside && !state.picked) {
+      told.chosen = next.chosen = state.chosen = firstTarget(inside, moved);
+      table.press();
+    }
     const target = inside ? targetOf(inside, state.chosen, moved) : null;
     const above = Math.round(depth) ? `${amount(depth)} above ${restOrScan}` : '';
     const sentence = sentenceOf(basis, moved, target, state.gravity, above);
@@ -311,7 +322,7 @@ function start() {
     table?.show(moved);
     write('targets-title', `Targets, ${whereWords(state.gravity).replace(/^./, (c) => c.toLowerCase())}`);
     tellVolumes(moment, moved);
-    outlines.show(moment, state.from, target, radii?.[state.chosen]);
+    outlines.show(moment, state.from, target, inside && anatomyColour(inside, state.chosen) ? 0 : radii?.[state.chosen]);
     write('outlines-title', target && !state.slices ? `Outlines through ${target.name}` : 'Outlines');
     write('outlines-text', `Dashed: ${state.from.name}. Solid: ${postureWords(state.gravity)}${above && `, ${above}`}. Drag to move a slice.`);
     for (const { posture, answer } of buttons) {
@@ -741,6 +752,7 @@ function start() {
   document.querySelector('[name=kind][value=expansion]').disabled = basis.words === 0;
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
+  write('patient-fit', basis.metadata.patient ? `fitted to this patient: ${basis.metadata.patient}` : '');
   write('state', basis.fields ? `another simulator\u2019s fields of gravity, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
@@ -784,7 +796,7 @@ function start() {
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Do the CPU part of the work of one frame. */
     frameScript: () => { state.compute(); panes = makePanes(); onStage(drawNotes); showState(); },
-    sentenceOf, movedBetween, targetOf, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    sentenceOf, movedBetween, targetOf, armsOf, downOf, torsoRings, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 
@@ -804,7 +816,7 @@ const errorOf = ({ metadata, fields }) => metadata.error_rms_percent && `${Numbe
 function showFacts(basis) {
   const { metadata } = basis;
   const facts = [
-    ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices`],
+    ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices${basis.wholeVertices > basis.vertices ? ` of ${basis.wholeVertices.toLocaleString('en')}` : ''}`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
     ['error', errorOf(basis)],
     ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
@@ -826,6 +838,8 @@ function tell(text) {
 
 document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
 try {
+  if (!MeshoptDecoder.supported) throw new Error('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
+  await MeshoptDecoder.ready;
   window.supine = start();
 } catch (error) {
   tell(error.message);

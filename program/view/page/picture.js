@@ -7,18 +7,8 @@ const source = (id) => document.getElementById(id).textContent;
 
 const NO_CUT = [0, 0, 0, 1e10];
 const ARROWS_SHOWN = 500;
+const CONTENT_COLOURS = 2 + ANATOMY_COLOURS.length; // of targets, of the chosen one, and of anatomy
 const WIDTH = 2048; // width of the textures that hold lists, texels
-
-/** Outline of the patient's body: height of the section's centre above the centre of the lungs, and its half widths to
- * the sides and to front and back, as multiples of half the lungs' extent along each axis. */
-const TORSO = [[-4.4, 1.2, 1.16], [-3, 1.2, 1.14], [-2, 1.1, 1.08], [-1, 1.16, 1.18], [0, 1.3, 1.22], [0.6, 1.45, 1.14], [1, 1.42, 0.94], [1.25, 0.95, 0.72], [1.45, 0.44, 0.54], [1.7, 0.4, 0.52], [1.92, 0.46, 0.7], [2.3, 0.56, 0.84], [2.65, 0.52, 0.78], [2.9, 0.34, 0.5], [3, 0.001, 0.001]];
-
-/** Return rows of numbers with `count` - 1 rows between each two, on a Catmull-Rom spline. */
-const smooth = (rows, count) => Array.from({ length: (rows.length - 1) * count + 1 }, (_, i) => {
-  const [at, t] = [Math.min(Math.floor(i / count), rows.length - 2), i / count - Math.min(Math.floor(i / count), rows.length - 2)];
-  const [a, b, c, d] = [at - 1, at, at + 1, at + 2].map((j) => rows[Math.max(0, Math.min(rows.length - 1, j))]);
-  return b.map((x, k) => x + 0.5 * t * (c[k] - a[k] + t * (2 * a[k] - 5 * x + 4 * c[k] - d[k] + t * (3 * (x - c[k]) + d[k] - a[k]))));
-});
 
 class Picture {
   constructor(canvas, basis) {
@@ -40,6 +30,7 @@ class Picture {
     this.arrow = this.makeArrow();
     this.table = this.makeTable();
     this.torso = this.makeTorso();
+    this.arms = { down: undefined };
     this.timer = gl.getExtension('EXT_disjoint_timer_query_webgl2');
     this.timing = null;
     this.gpuTime = NaN;
@@ -159,7 +150,7 @@ class Picture {
     const ball = [];
     for (let i = 0; i < rings; ++i) for (let j = 0; j < sides; ++j) ball.push(...at(i, j), ...at(i + 1, j), ...at(i + 1, j + 1), ...at(i, j), ...at(i + 1, j + 1), ...at(i, j + 1));
     this.ball = { buffer: this.buffer(new Float32Array(ball)), count: ball.length / 3 };
-    this.targetMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, 2, 1, null);
+    this.targetMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, CONTENT_COLOURS, 1, null);
   }
 
   texture(internal, format, type, width, height, data) {
@@ -284,7 +275,7 @@ class Picture {
   makeTorso() {
     const { gl, basis: { torso: { centre, half } } } = this;
     const sides = 48;
-    const rings = smooth(TORSO, 6);
+    const rings = torsoRings();
     const [places, normals, indices] = [[], [], []];
     rings.forEach(([z, rx, ry], i) => {
       const [below, above] = [rings[Math.max(0, i - 1)], rings[Math.min(rings.length - 1, i + 1)]];
@@ -301,6 +292,20 @@ class Picture {
     });
     return { array: this.array([[this.buffer(new Float32Array(places)), 3, 12, 0], [this.buffer(new Float32Array(normals)), 3, 12, 0]]),
       indices: this.buffer(new Uint32Array(indices), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER), count: indices.length };
+  }
+
+  /** Make the vertex array of the patient's arms, if it was made for another way down. */
+  makeArms(down) {
+    const { gl, arms, basis: { torso } } = this;
+    if (arms.down === String(down)) return;
+    for (const old of arms.buffers ?? []) gl.deleteBuffer(old);
+    if (arms.array) gl.deleteVertexArray(arms.array);
+    const tubes = armsOf(torso, down).map((line) => tubeOf(line.map(([x, y, z, radius]) => [x + torso.centre[0], y + torso.centre[1], z + torso.centre[2], radius]), 16));
+    const first = tubes[0].places.length / 3;
+    const [places, normals] = ['places', 'normals'].map((key) => this.buffer(new Float32Array(tubes.flatMap((tube) => tube[key]))));
+    const corners = tubes.flatMap((tube, i) => tube.corners.map((corner) => corner + i * first));
+    const indices = this.buffer(new Uint32Array(corners), gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+    Object.assign(arms, { down: String(down), buffers: [places, normals, indices], array: this.array([[places, 3, 12, 0], [normals, 3, 12, 0]]), indices, count: corners.length });
   }
 
   /** Run the shader program of `inputs` on their vertices, and store its output in the buffer `target`. `moment` is the
@@ -479,43 +484,62 @@ class Picture {
     ghost(2);
   }
 
-  /** Draw the structures inside the lungs with a shader program that usePane has set up: meshes, and points as balls of
-   * radius `radius`, mm. */
-  drawInside(program, pane, radius) {
+  /** Draw structures inside the lungs with a shader program that usePane has set up: meshes, and points as balls of radius
+   * `radius`, mm. `which` is null for all targets, or one of inside.shells, or 'dots' for the points of anatomy. */
+  drawInside(program, pane, radius, which) {
     const { gl, basis: { inside } } = this;
     const now = this.state(pane.state).inside;
-    const array = (kind, shape, each) => {
+    const array = (kind, shape, each, first) => {
       const key = `${kind} ${pane.state}`;
-      this.arrays[key] ??= this.array([...shape, [now, 3, 16, 0, each], [this.insideParts, 1, 4, 0, each]]);
+      this.arrays[key] ??= this.array([...shape, [now, 3, 16, 16 * first, each], [this.insideParts, 1, 4, 4 * first, each]]);
       gl.bindVertexArray(this.arrays[key]);
     };
+    const ball = [[this.ball.buffer, 3, 12, 0], [this.ball.buffer, 3, 12, 0]];
     gl.uniform1f(program.at.radius, radius);
-    if (inside.points) {
-      array('balls', [[this.ball.buffer, 3, 12, 0], [this.ball.buffer, 3, 12, 0]], 1);
-      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.ball.count, inside.points);
+    if (which === 'dots') {
+      if (inside.points === inside.balls) return;
+      array('dots', ball, 1, inside.balls);
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.ball.count, inside.points - inside.balls);
+      return;
     }
-    if (inside.corners.length) {
-      array('meshes', [null, [this.insideNormals, 3, 12, 0]], 0);
+    if (!which && inside.balls) {
+      array('balls', ball, 1, 0);
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.ball.count, inside.balls);
+    }
+    const { begin, count } = which ?? { begin: 0, count: inside.targetCorners };
+    if (count) {
+      array('meshes', [null, [this.insideNormals, 3, 12, 0]], 0, 0);
       gl.vertexAttrib3f(0, 0, 0, 0);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.insideIndices);
-      gl.drawElements(gl.TRIANGLES, inside.corners.length, gl.UNSIGNED_INT, 0);
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * begin);
     }
   }
 
-  /** Draw the structures inside the lungs in one colour, and the chosen structure in another. */
+  /** Draw the structures inside the lungs: targets in one colour, and the chosen one in another; then anatomy, each
+   * structure as a translucent shell of its own colour. */
   drawContent(pane) {
-    const { gl, content } = this;
+    const { gl, content, basis: { inside } } = this;
     this.usePane(content, pane, [0, 0, 1, 1]);
     gl.bindTexture(gl.TEXTURE_2D, this.targetMap);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 2, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pane.targetTints.flatMap((tint) => [...tint.map((x) => 255 * x), 255])));
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, CONTENT_COLOURS, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pane.targetTints.flatMap((tint) => [...tint.map((x) => 255 * x), 255])));
     gl.uniform4fv(content.at.cut, NO_CUT); // only the lungs are cut
     gl.uniform1f(content.at.chosen, pane.chosen);
-    gl.uniform2f(content.at.range, 0, 1);
+    gl.uniform2f(content.at.range, 0, CONTENT_COLOURS - 1);
+    gl.uniform1f(content.at.tint, -1);
     gl.uniform1f(content.at.spacing, 0);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);
     gl.uniform1f(content.at.opacity, 1);
     gl.uniform1f(content.at.ghost, 5);
-    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel)); // radius of at least 4 pixels
+    this.drawInside(content, pane, Math.max(BALL_RADIUS, 4 * pane.pixel), null); // radius of at least 4 pixels
+    gl.uniform1f(content.at.tint, 0);
+    this.drawInside(content, pane, DOT_RADIUS, 'dots');
+    gl.uniform1f(content.at.ghost, 6);
+    gl.depthMask(false);
+    for (const shell of inside.shells) {
+      gl.uniform1f(content.at.tint, shell.part === pane.chosen ? 1 : 2 + shell.colour);
+      this.drawInside(content, pane, 0, shell);
+    }
+    gl.depthMask(true);
   }
 
   /** Draw arrows that show displacements at some vertices. */
@@ -535,7 +559,7 @@ class Picture {
     }
   }
 
-  /** Draw the patient's body around the lungs, faint, and fading out towards the feet. */
+  /** Draw the patient's torso and arms around the lungs, faint, and fading out towards the feet. */
   drawTorso(pane) {
     const { gl, surface } = this;
     this.usePane(surface, pane, [0, 0, 1, 1]);
@@ -543,10 +567,13 @@ class Picture {
     gl.uniform2f(surface.at.range, ...pane.fade);
     gl.uniform1f(surface.at.ghost, 3);
     gl.uniform1f(surface.at.dark, pane.dark ? 1 : 0);
-    gl.bindVertexArray(this.torso.array);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.torso.indices);
+    this.makeArms(downOf(pane.gravity));
     gl.depthMask(false);
-    gl.drawElements(gl.TRIANGLES, this.torso.count, gl.UNSIGNED_INT, 0);
+    for (const { array, indices, count } of [this.torso, this.arms]) {
+      gl.bindVertexArray(array);
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+    }
     gl.depthMask(true);
   }
 
@@ -638,12 +665,8 @@ class Picture {
       if (opacity > 0) this.drawLung(lung, gl.TRIANGLES);
     });
     if (pane.inside) {
-      gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that translucent lungs hide nothing inside them
-      gl.colorMask(false, false, false, false);
-      pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
-      gl.colorMask(true, true, true, true);
-      this.usePane(this.contentPicker, pane, [x, y, pane.box[2], pane.box[3]]);
-      this.drawInside(this.contentPicker, pane, Math.max(BALL_RADIUS, 8 * pane.pixel));
+      this.pickInside(pane, x, y, [...this.basis.inside.shells, 'dots'], DOT_RADIUS);
+      this.pickInside(pane, x, y, [null], Math.max(BALL_RADIUS, 8 * pane.pixel)); // anatomy hides no target inside it
     }
     gl.bindVertexArray(null);
     this.pickBits = this.buffer(16, gl.STREAM_READ, gl.PIXEL_PACK_BUFFER); // a new buffer, because reading into the old one would wait
@@ -652,6 +675,22 @@ class Picture {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     this.picking = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
+  }
+
+  /** Draw structures inside the lungs to the image of pick(), where opaque lungs do not hide them. `which` lists what
+   * drawInside takes. */
+  pickInside(pane, x, y, which, radius) {
+    const { gl } = this;
+    const lens = [x, y, pane.box[2], pane.box[3]];
+    gl.clearBufferfv(gl.DEPTH, 0, [1]); // so that translucent lungs, and structures drawn before, hide nothing
+    this.usePane(this.picker, pane, lens);
+    gl.bindVertexArray(this.shown(pane.state, pane.origin));
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.indices);
+    gl.colorMask(false, false, false, false);
+    pane.opacity.forEach((opacity, lung) => { if (opacity === 1) this.drawLung(lung, gl.TRIANGLES); });
+    gl.colorMask(true, true, true, true);
+    this.usePane(this.contentPicker, pane, lens);
+    for (const each of which) this.drawInside(this.contentPicker, pane, radius, each);
   }
 
   /** Return the point that pick() requested: null if nothing is seen there, undefined if the graphics card has not

@@ -93,6 +93,7 @@ class State {
     this.beside = false;                           // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside);           // whether structures inside the lungs are shown
     this.chosen = 0;                               // structure inside the lungs that the sentence is about
+    this.picked = false;                           // whether the user chose it; otherwise it is the one that firstTarget returns
     this.opacity = Array(basis.lungs).fill(FADED);
     this.cut = { axis: -1, at: 0.5 };              // cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
     this.ownRanges = {};                           // for each of KINDS, the range {begin, end} of the colour bar if the user typed one

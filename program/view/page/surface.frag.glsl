@@ -12,7 +12,7 @@ uniform vec4 cut;      // cutting plane: points p in body axes with dot(p, xyz) 
 uniform float opacity;
 uniform float ghost;   // 0: surface in colours; 1: translucent shell; 2: only the outline of the shell; 3: the patient's
                        // body, which fades out from range.x to range.y along z; 4: translucent shell of the lungs, lit at the
-                       // rim; 5: a structure inside the lungs
+                       // rim; 5: a structure inside the lungs; 6: translucent shell of anatomy inside the lungs
 uniform vec4 rise;     // height of a point p: dot(p, rise.xyz) + rise.w, 0 at the lowest point of the lungs, 1 at the highest
 uniform float flatly;  // 1 for colours without shading (the wireframe)
 out vec4 colour;
@@ -50,6 +50,11 @@ void main() {
   if (!gl_FrontFacing && cut.w < 1e9) base = mix(base, vec3(0.55), 0.55); // inner side, visible through the cut: greyish
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.45));
+  if (ghost > 5.5) {
+    float amount = 0.12 + 0.6 * pow(edge, 2.0);
+    colour = vec4(base * amount, amount);
+    return;
+  }
   if (ghost > 4.5) {
     float shine = 0.25 * pow(max(dot(n, normalize(key + view)), 0.0), 30.0);
     colour = vec4(clamp(base * (0.58 + 0.46 * max(dot(n, key), 0.0)) + shine, 0.0, 1.0), 1.0);

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Draw the outlines of the lungs in slices, for outline.html: in three planes through each target,
+ * or in four slices if there are no targets. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/arena.h"
+#include "base/locale.h"
+#include "base/number.h"
+
+#include "program/report/comparison.h"
+#include "program/view/render/render.h"
+
+enum { TARGETS_MAX = 30 }; /* targets whose outlines are drawn */
+
+/* A slice as it is drawn. */
+typedef struct slice {
+  const char *name;
+  size_t axis;      /* axis normal to the slice */
+  double share;     /* position along `axis`, as a fraction of the lungs' extent */
+  size_t across;    /* axis that points to the right in the picture */
+  size_t vertical;  /* axis that is vertical in the picture */
+  double sign;      /* 1 if `vertical` points down, -1 if it points up */
+  const char *ends; /* letters at the right, left, top and bottom */
+} slice;
+
+/* Slices without a target. */
+static const slice slices[] = {{"Axial, upper third", 2, 2.0 / 3, 0, 1, 1, "LRAP"},
+                               {"Axial, lower third", 2, 1.0 / 3, 0, 1, 1, "LRAP"},
+                               {"Coronal, front third", 1, 1.0 / 3, 0, 2, -1, "LRHF"},
+                               {"Coronal, back third", 1, 2.0 / 3, 0, 2, -1, "LRHF"}};
+
+/* Planes through a target. */
+static const slice planes[] = {{"axial, from the feet", 2, 0, 0, 1, 1, "LRAP"},
+                               {"coronal, from the front", 1, 0, 0, 2, -1, "LRHF"},
+                               {"sagittal, from the left", 0, 0, 1, 2, -1, "PAHF"}};
+
+/* The lungs in the reference pose and in each posture. */
+typedef struct shapes {
+  const supine_comparison *c;
+  const supine_basis_info *info;
+  float *before; /* [N, 3] mm */
+  float **now;   /* [postures.count][N, 3] mm */
+  double low[3]; /* box of the lungs in all postures, mm */
+  double high[3];
+  supine_arena arena;
+} shapes;
+
+static void free_shapes(shapes *s) {
+  supine_arena_free(&s->arena);
+}
+
+/* Compute the positions of all vertices. Return false if memory has run out. */
+static bool find_shapes(const supine_comparison *c, shapes *s) {
+  s->c = c;
+  s->info = supine_basis_get_info(c->basis);
+  const size_t n = s->info->vertex_count;
+  s->now = supine_arena_zeros(&s->arena, c->postures.count, sizeof *s->now);
+  s->before = supine_arena_take(&s->arena, n, 3 * sizeof *s->before);
+  for (size_t i = 0; i < c->postures.count && !s->arena.failed; ++i) {
+    s->now[i] = supine_arena_take(&s->arena, n, 3 * sizeof *s->now[i]);
+  }
+  if (s->arena.failed) {
+    return false;
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    s->low[axis] = INFINITY;
+    s->high[axis] = -INFINITY;
+  }
+  (void)supine_deform(c->basis, &c->reference.pose, s->before);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)supine_deform(c->basis, &c->posture[i].pose, s->now[i]);
+    supine_render_box(s->now[i], n, s->low, s->high);
+  }
+  return true;
+}
+
+/* Convert a point, mm, to coordinates of the picture. */
+static void project(const slice *s, const double xyz[3], double point[2]) {
+  point[0] = xyz[s->across];
+  point[1] = s->sign * xyz[s->vertical];
+}
+
+/* Compute the point where the edge from `a` to `b` crosses the slice at the coordinate `at`, mm. */
+static void cross(const slice *s, double at, const float *a, const float *b, double point[2]) {
+  const double t = (at - (double)a[s->axis]) / ((double)b[s->axis] - (double)a[s->axis]);
+  double xyz[3];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    xyz[axis] = (double)a[axis] + t * ((double)b[axis] - (double)a[axis]);
+  }
+  project(s, xyz, point);
+}
+
+/* Print the outline as an SVG path, with a line for each triangle that the slice crosses. Return
+ * the area inside the outline, mm^2. */
+static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
+                    FILE *path) {
+  double twice = 0;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    double up[2] = {NAN, NAN}; /* point where the triangle's boundary rises through the plane */
+    double down[2] = {0, 0};
+    for (size_t i = 0; i < 3; ++i) {
+      const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];
+      const float *b = xyz + 3 * (size_t)info->triangles[3 * t + (i + 1) % 3];
+      const bool above[2] = {(double)a[s->axis] > at, (double)b[s->axis] > at};
+      if (above[0] != above[1]) {
+        cross(s, at, a, b, above[1] ? up : down);
+      }
+    }
+    if (!isnan(up[0])) {
+      twice += up[0] * down[1] - down[0] * up[1];
+      (void)supine_print(path, "M%.1f %.1fL%.1f %.1f", up[0], up[1], down[0], down[1]);
+    }
+  }
+  return fabs(twice) / 2;
+}
+
+/* Return the outline of positions as an SVG path; set `area` to the area inside, mm^2. */
+static json_t *outline(const shapes *of, const slice *s, double at, const float *xyz,
+                       double *area) {
+  char *text = NULL;
+  size_t size = 0;
+  FILE *path = open_memstream(&text, &size);
+  if (path == NULL) {
+    return json_string("");
+  }
+  *area = trace(of->info, s, at, xyz, path);
+  json_t *made = fclose(path) == 0 ? json_string(text) : json_string("");
+  free(text);
+  return made;
+}
+
+static json_t *letter(double x, double y, char name) {
+  SUPINE_C_LOCALE;
+  return json_pack("{s:o, s:o, s:o}", "x", json_sprintf("%.0f", x), "y", json_sprintf("%.0f", y),
+                   "letter", json_sprintf("%c", name));
+}
+
+/* Return the chart of a slice at the coordinate `at`, mm, without a title: outlines in the
+ * reference and in each posture, letters at the ends, and a bar of 5 cm. */
+static json_t *chart(const shapes *of, const slice *s, double at, double *before, double *area) {
+  SUPINE_C_LOCALE;
+  enum { MARGIN = 18, SCALE_BAR = 50 }; /* mm */
+  const double left = of->low[s->across];
+  const double right = of->high[s->across];
+  const double top = s->sign > 0 ? of->low[s->vertical] : -of->high[s->vertical];
+  const double bottom = s->sign > 0 ? of->high[s->vertical] : -of->low[s->vertical];
+  json_t *path = outline(of, s, at, of->before, before);
+  json_t *lines = json_array();
+  for (size_t i = 0; i < of->c->postures.count; ++i) {
+    if (!supine_report_is_reference(of->c, i)) {
+      json_t *own = outline(of, s, at, of->now[i], &area[i]);
+      (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:o}", "line", supine_report_line(i),
+                                                   "name", of->c->posture[i].label, "path", own));
+    }
+  }
+  return json_pack("{s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "box",
+                   json_sprintf("%.0f %.0f %.0f %.0f", left - MARGIN, top - MARGIN,
+                                right - left + 2 * MARGIN, bottom - top + 2 * MARGIN + 10),
+                   "before", path, "lines", lines, "mark",
+                   json_sprintf("M%.0f %.0fh%d", left - MARGIN + 2, bottom + MARGIN + 6, SCALE_BAR),
+                   "letters", letter(right + 10, (top + bottom) / 2, s->ends[0]),
+                   letter(left - 10, (top + bottom) / 2, s->ends[1]),
+                   letter((left + right) / 2, top - 10, s->ends[2]),
+                   letter((left + right) / 2, bottom + 10, s->ends[3]));
+}
+
+/* Return the title of a slice, which states how each posture changes the area. */
+static json_t *area_title(const supine_comparison *c, const slice *s, double before,
+                          const double *area) {
+  SUPINE_C_LOCALE;
+  const char *separator = "";
+  json_t *title = json_sprintf("%s: area", s->name);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    if (!supine_report_is_reference(c, i)) {
+      json_t *longer = json_sprintf("%s%s %s %+.0f %%", json_string_value(title), separator,
+                                    c->posture[i].label, 100 * (area[i] / before - 1));
+      json_decref(title);
+      title = longer;
+      separator = ",";
+    }
+  }
+  return title;
+}
+
+json_t *supine_report_outlines(const supine_comparison *c) {
+  SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
+  json_t *list = json_array();
+  if (!find_shapes(c, &of)) {
+    return list;
+  }
+  double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
+  if (area == NULL) {
+    return list;
+  }
+  for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
+    const slice *s = &slices[i];
+    double before = 0.0;
+    const double at = of.low[s->axis] + s->share * (of.high[s->axis] - of.low[s->axis]);
+    json_t *made = chart(&of, s, at, &before, area);
+    (void)json_object_set_new(made, "title", area_title(c, s, before, area));
+    (void)json_array_append_new(list, made);
+  }
+  return list;
+}
+
+/* Add to the chart of a plane where target `k` was, and a dot where it is in each posture. */
+static void add_target(const supine_comparison *c, const slice *s, size_t k, const double was[3],
+                       json_t *made) {
+  SUPINE_C_LOCALE;
+  double from[2];
+  json_t *dots = json_array();
+  project(s, was, from);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    if (!supine_report_is_reference(c, i)) {
+      double to[2];
+      project(s, c->posture[i].targets[k].at, to);
+      (void)json_array_append_new(
+          dots, json_pack("{s:o, s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", to[0]), "y",
+                          json_sprintf("%.1f", to[1]), "way",
+                          json_sprintf("M%.1f %.1fL%.1f %.1f", from[0], from[1], to[0], to[1]),
+                          "line", supine_report_line(i), "name", c->posture[i].label));
+    }
+  }
+  (void)json_object_set_new(made, "title", json_string(s->name));
+  (void)json_object_set_new(made, "target",
+                            json_pack("{s:o, s:o, s:o}", "was_x", json_sprintf("%.1f", from[0]),
+                                      "was_y", json_sprintf("%.1f", from[1]), "dots", dots));
+}
+
+/* Return the charts of the planes through the place where target `k` was. */
+static json_t *target_charts(const shapes *of, size_t k, double *area) {
+  const supine_target *t = &of->c->posture[0].targets[k];
+  json_t *charts = json_array();
+  double was[3];
+  for (size_t axis = 0; axis < 3; ++axis) {
+    was[axis] = t->at[axis] - t->move[axis];
+  }
+  for (size_t i = 0; i < sizeof planes / sizeof *planes; ++i) {
+    double before = 0.0;
+    json_t *made = chart(of, &planes[i], was[planes[i].axis], &before, area);
+    add_target(of->c, &planes[i], k, was, made);
+    (void)json_array_append_new(charts, made);
+  }
+  return json_pack("{s:s, s:o}", "name", of->c->names.text[k], "outlines", charts);
+}
+
+json_t *supine_report_target_outlines(const supine_comparison *c) {
+  SUPINE_C_LOCALE;
+  SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
+  size_t left_out = 0;
+  if (!find_shapes(c, &of)) {
+    return NULL;
+  }
+  double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
+  if (area == NULL) {
+    return NULL;
+  }
+  json_t *list = json_array();
+  for (size_t k = 0; k < c->names.count; ++k) {
+    const bool drawn =
+        !c->posture[0].targets[k].anatomy && c->names.begin[k + 1] > c->names.begin[k];
+    if (drawn && json_array_size(list) < TARGETS_MAX) {
+      (void)json_array_append_new(list, target_charts(&of, k, area));
+    } else if (drawn) {
+      ++left_out;
+    }
+  }
+  if (json_array_size(list) == 0) {
+    json_decref(list);
+    return NULL;
+  }
+  return json_pack("{s:o, s:o*}", "traced", list, "left_out",
+                   left_out > 0 ? json_sprintf("%zu further target%s not drawn.", left_out,
+                                               left_out == 1 ? " is" : "s are")
+                                : NULL);
+}
