@@ -152,8 +152,8 @@ typedef struct supine_basis_info {
   const uint16_t *cluster; /**< [vertex_count] cluster of each vertex, or NULL */
   /** [vertex_count, 2] scalars of each vertex, or NULL. */
   const int16_t *cluster_scalars;
-  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and two
-   * vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
+  /** [cluster_count, mode_count, SUPINE_CLUSTER_NUMBERS] a vector m, the rows of a matrix B, and
+   * two vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
    * a_1 P_1. NULL if there are no clusters. */
   const float *cluster_vectors;
 } supine_basis_info;
@@ -288,6 +288,13 @@ SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 /** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
+/** Compute the pose in which the lungs have their shape in the scan: that of the state
+ * supine_basis_scan or, in a basis of another simulator's fields over gravity and volume, whose
+ * displacements count from the scanned surface, that of the reference surface. Statuses: as
+ * supine_basis_pose. */
+SUPINE_API supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
+                                                supine_error *error);
+
 /** Compute the volume of each lung in a pose.
  * @param volumes  [lung_count] volumes of gas and tissue, mL, written
  * @retval SUPINE_ERROR_OPEN_SURFACE  the basis has no volumes (supine_basis_info.has_volume) */
@@ -420,13 +427,13 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 }
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
  *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
  *                    vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes, or each lung has
- *                                   weights of its own (supine_basis_info.order is above 0) */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
 /** Compute the uniforms supine_weights and supine_gains of supine.glsl.
- * @param weights  [4 ceil(mode_count / 4)], written
+ * @param weights  [4 ceil(mode_count / 4)], written; [lung_count, 4 ceil(mode_count / 4)] if
+ *                 supine_basis_info.order is above 0, which needs SUPINE_BY_LUNG in supine.glsl
  * @param gains    [lung_count, 3], written
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
