@@ -123,3 +123,13 @@ supine_status supine_basis_pose(const supine_basis *basis, const supine_state *s
   SUPINE_TRY(supine_basis_pose_any(basis, state, pose, error));
   return basis->allow_folds ? SUPINE_OK : supine_basis_check(basis, state, pose, error);
 }
+
+supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
+                                     supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  if (basis->info.order > 0) {
+    *pose = (supine_pose){.basis = basis->info.identity};
+    return SUPINE_OK;
+  }
+  return supine_basis_pose(basis, &scan, pose, error);
+}

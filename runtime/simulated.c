@@ -8,8 +8,13 @@
 #include "base/arena.h"
 #include "runtime/simulated.h"
 
-/* Difference between the volume asked and the volume of the surface that ends the search, mL. */
+/* Difference between the volume asked and the volume of the surface that ends the search, mL. A
+ * volume may be outside the limits by as much, as sums of volumes are rounded. */
 static const double close_enough = 1e-6;
+
+static bool is_within(double volume, double low, double high) {
+  return volume >= low - close_enough && volume <= high + close_enough;
+}
 
 /* How far outside the simulated range of t the search may go: the volume of the surface differs
  * from the one that t stands for by less than that. */
@@ -80,7 +85,7 @@ static supine_status share_out(const supine_basis *basis, const double gravity[3
       volumes[lung] += s->shares[lung * terms + i] * products[i];
     }
   }
-  if (!(total >= range[0] && total <= range[1])) {
+  if (!is_within(total, range[0], range[1])) {
     return refuse_volume(NULL, range[2] + total, range[2] + range[0], range[2] + range[1], error);
   }
   keep_within(lungs, (const double(*)[2])limits, total, volumes);
@@ -172,7 +177,7 @@ static supine_status solve_lungs(const supine_basis *basis, const double gravity
     const double reference = basis->info.reference_volume[lung];
     double *weights = pose->weights + lung * basis->info.mode_count;
     p.lung = lung;
-    if (!(volumes[lung] >= limits[lung][0] && volumes[lung] <= limits[lung][1]) ||
+    if (!is_within(volumes[lung], limits[lung][0], limits[lung][1]) ||
         !solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
                map_to_unit(limits[lung][1], range) + beyond, weights)) {
       return refuse_volume(basis->info.lung_names[lung], reference + volumes[lung],

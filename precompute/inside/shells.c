@@ -60,14 +60,13 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
                                           supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   *shells = (supine_inside_shells){.basis = basis, .count = info->lung_count};
-  const supine_state scan = supine_basis_scan(basis);
   SUPINE_REFUSE_IF(supine_basis_metadata(basis, "content") != NULL, error, SUPINE_ERROR_FORMAT,
                    "the basis already holds %s inside lungs: give the basis of the lungs' surface",
                    supine_basis_metadata(basis, "content"));
   SUPINE_ARENA arena = {0};
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
-  const supine_status posed = supine_basis_pose(basis, &scan, &shells->scan, error);
+  const supine_status posed = supine_basis_scan_pose(basis, &shells->scan, error);
   SUPINE_REFUSE_ADVISE(posed == SUPINE_ERROR_NUMERICAL, error, SUPINE_REMEDY_BASIS_OF_STATE, posed,
                        "the basis cannot reach the scan's volume");
   SUPINE_TRY(posed);

@@ -149,7 +149,8 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     state = in_scan;
   }
   supine_error inner;
-  const supine_status status = supine_basis_pose(basis, &state, &reference->pose, &inner);
+  const supine_status status = scan ? supine_basis_scan_pose(basis, &reference->pose, &inner)
+                                    : supine_basis_pose(basis, &state, &reference->pose, &inner);
   reference->state = state;
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
