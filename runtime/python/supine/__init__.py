@@ -206,13 +206,15 @@ class Basis:
 
     vertices: float32 [N, 3], reference positions, mm
     triangles: uint32 [M, 3], three vertices of each triangle
-    coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true
+    coefficients: float32 [N, K] for K modes, or [N, 3, K] if `vector` is true; computed in a basis of clusters
     direction: float32 [N, 3], vector along which each vertex moves, mm; None if `vector` is true
     modes: float64 [K, (band + 1)^2, order + 1], spherical-harmonic coefficients of the weight of each mode, for each
         polynomial of the volume; order is 0 unless the file holds another simulator's fields over volume
     bounds: float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs: dict from the name of each lung to the slice of its vertices
     metadata: dict from the keys of the file's metadata to the texts
+    order: highest degree of the polynomials of a lung's volume in another simulator's fields over gravity and volume; if
+        it is above 0, each lung has weights of its own
     storage_error: bound on position errors from storage and rounding, for 500 mL above the reference surface, mm
     report: what the program printed when `precompute` or `embed` made the basis
     """
@@ -228,6 +230,7 @@ class Basis:
         self.triangle_count: int = info.triangle_count
         self._size = 3 * self.vertex_count
         self.mode_count: int = info.mode_count
+        self.order: int = info.order
         self.band: int = info.band
         self.vector: bool = info.vector
         self.has_volume: bool = info.has_volume
@@ -245,7 +248,6 @@ class Basis:
                                          for i in range(size.value)}
         self.vertices: Floats = self._tensor("vertices")
         self.triangles: NDArray[np.uint32] = self._tensor("triangles")
-        self.coefficients: Floats = self._tensor("coefficients")
         self.direction: Optional[Floats] = None if self.vector else self._tensor("direction")
         self.modes: Doubles = self._tensor("modes")
         self.bounds: Floats = self._owner.view(ctypes.cast(info.bounds, ctypes.c_void_p).value or 0, ctypes.c_float,
@@ -254,6 +256,14 @@ class Basis:
     def __repr__(self) -> str:
         return (f"<supine.Basis: {self.vertex_count} vertices, {self.triangle_count} triangles, "
                 f"{self.mode_count} modes, {', '.join(self.lungs)}>")
+
+    @property
+    def coefficients(self) -> Floats:
+        if self.tensor("coefficients") is not None:
+            return self._tensor("coefficients")
+        computed = np.empty((self.vertex_count, 3, self.mode_count), np.float32)
+        _c.basis_coefficients(self._c, 0, self.vertex_count, computed.ctypes.data)
+        return computed
 
     def _tensor(self, name: str) -> NDArray[Any]:
         tensor = _c.basis_tensor(self._c, name.encode()).contents
@@ -297,7 +307,10 @@ class Basis:
         if names is None or part is None:
             raise ArgumentError("the basis names no structures: make one with embed")
         origin = Pose()
-        _c.basis_pose(self._c, _c.basis_scan(self._c) if since is None else _state(since), origin)
+        if since is None:
+            _c.basis_scan_pose(self._c, origin)
+        else:
+            _c.basis_pose(self._c, _state(since), origin)
         after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
             sigma: Any = self.expected_error(state, volume, since)
@@ -373,8 +386,10 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """Return a view of the weights of a pose, one for each mode."""
-        return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
+        """Return a view of the weights of a pose, one for each mode. In a basis of another simulator's fields over gravity
+        and volume (`order` above 0), each lung has weights of its own: [lungs, modes]."""
+        shape = (len(self.lungs), self.mode_count) if self.order > 0 else (self.mode_count,)
+        return np.ctypeslib.as_array(pose.weights)[:int(np.prod(shape))].reshape(shape)
 
     def gains(self, pose: Pose) -> Doubles:
         """Return a view of the gains [lungs, 3] of a pose: factors of each lung's displacement along x, y and z."""
