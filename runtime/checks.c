@@ -128,9 +128,8 @@ supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pos
                                      supine_error *error) {
   const supine_state scan = supine_basis_scan(basis);
   if (basis->info.is_fields) {
-    memset(pose, 0, sizeof *pose);
-    pose->basis = basis->info.identity;
+    *pose = (supine_pose){.basis = basis->info.identity};
     return SUPINE_OK;
   }
-  return supine_basis_pose(basis, &scan, pose, error);
+  return supine_basis_pose_any(basis, &scan, pose, error);
 }

@@ -148,6 +148,19 @@ static void find_turn(const supine_state *state, const supine_state *from,
   m->sideways = fabs(change[0]);
 }
 
+/* Compute the pose of a state, or that of the scan if the state is the one in the scan. */
+static supine_status pose_or_scan(const supine_basis *basis, const supine_state *state,
+                                  supine_pose *pose, supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  const bool same = state->lung_count == 0 && state->volume.kind == scan.volume.kind &&
+                    state->volume.ml == scan.volume.ml &&
+                    supine_distance(state->gravity, scan.gravity) == 0;
+  if (basis->info.order > 0 && same) {
+    return supine_basis_scan_pose(basis, pose, error);
+  }
+  return supine_basis_pose_any(basis, state, pose, error);
+}
+
 supine_status supine_expected_prepare(const supine_basis *basis, const supine_state *state,
                                       const supine_state *from, double deviation, double least,
                                       supine_expected_model *m, supine_error *error) {
@@ -159,7 +172,8 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   supine_status status = SUPINE_OK;
   *m = (supine_expected_model){.basis = basis, .least = least};
   for (size_t k = 0; k < 2 && status == SUPINE_OK; ++k) {
-    status = supine_basis_pose_any(basis, states[k], &m->pose[k], error);
+    status = k == 0 ? supine_basis_pose_any(basis, state, &m->pose[0], error)
+                    : pose_or_scan(basis, from, &m->pose[1], error);
     m->pose[EXPECTED_FULLER + k] = m->pose[k];
     if (status == SUPINE_OK && (deviation > 0 ? k == 0 : counts_from(states[k], assumed))) {
       status = supine_expected_shifted(basis, states[k], &m->pose[EXPECTED_FULLER + k], error);

@@ -5,9 +5,9 @@
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 
-/* Return whether the shader can hold the modes. It has one weight of each mode for all lungs. */
+/* Return whether the shader can hold the modes. */
 static bool fits(const supine_basis *basis) {
-  return basis->info.mode_count <= SUPINE_GL_MODES && basis->info.order == 0;
+  return basis->info.mode_count <= SUPINE_GL_MODES;
 }
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
@@ -38,11 +38,14 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
 supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose, float *weights,
                                 float *gains) {
   const size_t modes = basis->info.mode_count;
+  const size_t stride = (modes + 3) / 4 * 4;
+  const size_t rows = basis->info.order > 0 ? basis->info.lung_count : 1;
   if (!fits(basis) || !supine_basis_has_pose(basis, pose)) {
     return fits(basis) ? SUPINE_ERROR_ARGUMENT : SUPINE_ERROR_UNSUPPORTED;
   }
-  for (size_t k = 0; k < (modes + 3) / 4 * 4; ++k) {
-    weights[k] = k < modes ? (float)pose->weights[k] : 0;
+  for (size_t i = 0; i < rows * stride; ++i) {
+    const double *of = supine_basis_lung_weights(basis, pose, i / stride);
+    weights[i] = i % stride < modes ? (float)of[i % stride] : 0;
   }
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     gains[i] = (float)pose->gains[i / 3][i % 3];

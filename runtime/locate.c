@@ -11,6 +11,7 @@
 #include "runtime/expected.h"
 #include "runtime/location.h"
 #include "runtime/rigid.h"
+#include "runtime/simulated.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
                "locate.h and kriging.h must allow the same number of points");
@@ -109,14 +110,32 @@ static void position(const supine_basis *basis, const supine_pose *pose, size_t 
   }
 }
 
+/* Return the volume, of the kind that the prior counts from, at which the search for an unknown
+ * volume begins. Fields over gravity and volume begin in the middle of the simulated range, from
+ * where they can be followed both ways. */
+static supine_volume begin_volume(const supine_basis *basis, const double gravity[3]) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double limits[SUPINE_LUNGS_MAX][2];
+  supine_volume volume = {SUPINE_VOLUME_SCAN, 0};
+  if (info->has_rest) {
+    volume.kind = SUPINE_VOLUME_REST;
+  } else if (info->order > 0 && supine_simulated_limits(basis, gravity, limits) == SUPINE_OK) {
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      volume.ml += 0.5 * (limits[lung][0] + limits[lung][1]);
+    }
+  }
+  return volume;
+}
+
 /* Set all parts of the workspace that do not depend on the state: the position in the scan, the
  * lung and the noise of each point, and the options of the fit. */
 static supine_status initialise(workspace *s, supine_error *error) {
   const supine_locate_task *task = s->task;
   const supine_basis *basis = task->inside;
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const bool unknown = task->state.lung_count == 0 && info->has_volume && !info->is_fields &&
-                       task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
+  const bool variable = info->has_volume && (!info->is_fields || info->order > 0);
+  const bool unknown =
+      task->state.lung_count == 0 && variable && task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
   const supine_status status = supine_basis_scan_pose(basis, &pose, error);
   if (status == SUPINE_OK) {
@@ -134,8 +153,7 @@ static supine_status initialise(workspace *s, supine_error *error) {
       .options = {.model = supine_kriging_default, .volume = unknown, .rotation = task->rigid},
       .deviation = unknown ? prior_spread * supine_expected_reference(basis) : 0};
   if (unknown) {
-    s->found->state.volume =
-        (supine_volume){info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, 0};
+    s->found->state.volume = begin_volume(basis, task->state.gravity);
   }
   s->fit->options.model.sill = sill_of_error * supine_expected_constant(basis);
   return status;

@@ -9,7 +9,8 @@
 #include "base/arena.h"
 #include "runtime/simulated.h"
 
-/* Difference between the volume asked and the volume of the surface that ends the search, mL. */
+/* Difference between the volume asked and the volume of the surface that ends the search, mL. A
+ * volume may be outside the limits by as much, as sums of volumes are rounded. */
 static const double close_enough = 1e-6;
 
 /* How far outside the simulated range of t the search may go: the volume of the surface differs
@@ -43,7 +44,8 @@ static supine_status refuse_volume(const char *lung, double volume, double low, 
 
 /* Return whether a volume is outside the simulated range. */
 static bool is_outside(double volume, double low, double high) {
-  return supine_input_judge(SUPINE_INPUT_FIELDS_VOLUME, fmax(low - volume, volume - high)) !=
+  const double distance = fmax(low - volume, volume - high);
+  return supine_input_judge(SUPINE_INPUT_FIELDS_VOLUME, distance - close_enough) !=
          SUPINE_INPUT_TAKEN;
 }
 

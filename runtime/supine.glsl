@@ -22,56 +22,87 @@
 #define SUPINE_WORDS 2 // uvec3s that hold the Q vectors of a vertex whose weighted sum is its normal: (Q + 2) / 3
 #endif
 
+#ifndef SUPINE_BY_LUNG
+#define SUPINE_BY_LUNG 0 // 1 if each lung has weights of its own: supine_basis_info.order is above 0
+#endif
+
+#if SUPINE_BY_LUNG
+uniform vec4 supine_weights[SUPINE_LUNGS * SUPINE_VECTORS];
+#else
 uniform vec4 supine_weights[SUPINE_VECTORS];
+#endif
 uniform vec3 supine_gains[SUPINE_LUNGS];
 uniform vec3 supine_normal_weights[SUPINE_LUNGS * SUPINE_WORDS];
+
+// Return the index in supine_weights of the first weights of a vertex's lung.
+int supine_first(vec4 reference) {
+  return SUPINE_BY_LUNG * SUPINE_VECTORS * int(reference.w);
+}
 
 vec3 supine_place(vec4 reference, vec3 direction, float amount) {
   return reference.xyz + supine_gains[int(reference.w)] * amount * direction;
 }
 
-// Sum weight times coefficient over the modes, and displace a vertex by the sum along `direction`.
+// Sum weight times coefficient over the modes, from supine_weights[first] on (supine_first), or from the first on; and
+// displace a vertex by the sum along `direction`.
+float supine_amount(int first, vec4 c0) {
+  return dot(supine_weights[first], c0);
+}
+
 float supine_amount(vec4 c0) {
-  return dot(supine_weights[0], c0);
+  return supine_amount(0, c0);
 }
 
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0) {
-  return supine_place(reference, direction, supine_amount(c0));
+  return supine_place(reference, direction, supine_amount(supine_first(reference), c0));
 }
 
 #if SUPINE_VECTORS > 1
+float supine_amount(int first, vec4 c0, vec4 c1) {
+  return dot(supine_weights[first], c0) + dot(supine_weights[first + 1], c1);
+}
+
 float supine_amount(vec4 c0, vec4 c1) {
-  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1);
+  return supine_amount(0, c0, c1);
 }
 
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1) {
-  return supine_place(reference, direction, supine_amount(c0, c1));
+  return supine_place(reference, direction, supine_amount(supine_first(reference), c0, c1));
 }
 #endif
 
 #if SUPINE_VECTORS > 2
+float supine_amount(int first, vec4 c0, vec4 c1, vec4 c2) {
+  return supine_amount(first, c0, c1) + dot(supine_weights[first + 2], c2);
+}
+
 float supine_amount(vec4 c0, vec4 c1, vec4 c2) {
-  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1) + dot(supine_weights[2], c2);
+  return supine_amount(0, c0, c1, c2);
 }
 
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2) {
-  return supine_place(reference, direction, supine_amount(c0, c1, c2));
+  return supine_place(reference, direction, supine_amount(supine_first(reference), c0, c1, c2));
 }
 #endif
 
 #if SUPINE_VECTORS > 3
+float supine_amount(int first, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
+  return supine_amount(first, c0, c1) +
+         (dot(supine_weights[first + 2], c2) + dot(supine_weights[first + 3], c3));
+}
+
 float supine_amount(vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
-  return dot(supine_weights[0], c0) + dot(supine_weights[1], c1) +
-         (dot(supine_weights[2], c2) + dot(supine_weights[3], c3));
+  return supine_amount(0, c0, c1, c2, c3);
 }
 
 vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, vec4 c3) {
-  return supine_place(reference, direction, supine_amount(c0, c1, c2, c3));
+  return supine_place(reference, direction, supine_amount(supine_first(reference), c0, c1, c2, c3));
 }
 #endif
 
 // Displace a vertex of a basis with coefficients along x, y and z (supine_basis_info.vector). `amounts` has the sum of
-// each axis, such as vec3(supine_amount(x0, x1), supine_amount(y0, y1), supine_amount(z0, z1)) with 5 to 8 modes.
+// each axis, such as vec3(supine_amount(x0, x1), supine_amount(y0, y1), supine_amount(z0, z1)) with 5 to 8 modes; if each
+// lung has weights of its own, supine_amount(supine_first(reference), x0, x1) and so on.
 vec3 supine_displace(vec4 reference, vec3 amounts) {
   return supine_place(reference, amounts, 1.0);
 }

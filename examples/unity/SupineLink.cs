@@ -36,8 +36,8 @@ namespace Supine
         /// <summary>Reason why reading ended; null while it continues.</summary>
         public Exception Failure { get; private set; }
 
-        // Returns the newest frame: the weights of the modes, then the factors of each lung's displacement
-        // along x, y and z. Returns null if no frame was received since the last call.
+        // Returns the newest frame: the weights of the modes (for each lung, in fields over volume), then the factors
+        // of each lung's displacement along x, y and z. Returns null if no frame was received since the last call.
         public float[] TakeNewest(out ulong poseStamp)
         {
             lock (guard)
@@ -190,6 +190,7 @@ namespace Supine
         [DllImport(Library)] static extern IntPtr supine_basis_get_info(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_vertices(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
+        [DllImport(Library)] static extern IntPtr supine_basis_tensor(IntPtr basis, string name);
         [DllImport(Library)] static extern int supine_state_parse(string text, byte[] state, IntPtr error);
         [DllImport(Library)] static extern int supine_basis_pose(IntPtr basis, byte[] state, double[] pose, IntPtr error);
         [DllImport(Library)] static extern int supine_deform(IntPtr basis, double[] pose, float[] xyz);
@@ -200,10 +201,19 @@ namespace Supine
             public UIntPtr Vertices, Triangles, Modes, Band, Lungs;
         }
 
+        [StructLayout(LayoutKind.Sequential)]
+        struct Tensor // supine_tensor
+        {
+            public IntPtr Name;
+            public int Type;
+            public UIntPtr Rank, Rows, Columns, Depth, Last;
+            public IntPtr Data;
+        }
+
         const int StateSize = 112; // sizeof(supine_state)
         const int ModesMax = 256, LungsMax = 16;
         IntPtr handle;
-        readonly int modes, lungs;
+        readonly int weights, lungs; // number of weights: one of each mode or, in fields over volume, of each lung and mode
         readonly double[] pose = new double[ModesMax + 3 * LungsMax + 1]; // supine_pose: weights, gains, basis
 
         public Basis(string path)
@@ -213,8 +223,9 @@ namespace Supine
             Info info = (Info)Marshal.PtrToStructure(supine_basis_get_info(handle), typeof(Info));
             VertexCount = (int)info.Vertices;
             TriangleCount = (int)info.Triangles;
-            modes = (int)info.Modes;
             lungs = (int)info.Lungs;
+            Tensor modes = (Tensor)Marshal.PtrToStructure(supine_basis_tensor(handle, "modes"), typeof(Tensor));
+            weights = (int)info.Modes * ((int)modes.Depth > 1 ? lungs : 1);
         }
 
         public int VertexCount { get; private set; }
@@ -223,7 +234,7 @@ namespace Supine
         /// <summary>Computes the positions [3 N] of the vertices from a received frame, mm, LPS.</summary>
         public void Deform(float[] frame, float[] xyz)
         {
-            if (frame.Length != modes + 3 * lungs || xyz.Length != 3 * VertexCount)
+            if (frame.Length != weights + 3 * lungs || xyz.Length != 3 * VertexCount)
                 throw new ArgumentException("the frame belongs to another basis: open the basis file of the server");
             for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
             if (supine_deform(handle, pose, xyz) != 0) throw new ArgumentException("the pose is of another basis");
@@ -236,7 +247,7 @@ namespace Supine
             if (supine_state_parse(text, state, IntPtr.Zero) != 0 ||
                 supine_basis_pose(handle, state, pose, IntPtr.Zero) != 0)
                 throw new ArgumentException(text + ": not a state that this basis can show");
-            float[] frame = new float[modes + 3 * lungs];
+            float[] frame = new float[weights + 3 * lungs];
             for (int i = 0; i < frame.Length; ++i) frame[i] = (float)pose[PoseIndex(i)];
             return frame;
         }
@@ -244,7 +255,7 @@ namespace Supine
         // Returns the index in `pose` of the i-th number of a frame.
         int PoseIndex(int i)
         {
-            return i < modes ? i : ModesMax + i - modes;
+            return i < weights ? i : ModesMax + i - weights;
         }
 
         public float[] Vertices()

@@ -177,12 +177,13 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
   const size_t modes = e->columns / 3;
+  const double *weights = supine_basis_lung_weights(e->shells->basis, &e->shells->scan, lung);
   for (size_t i = begin; i < end; ++i) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double *row = values + (i - begin) * e->columns + axis * modes;
       double moved = 0.0;
       for (size_t k = 0; k < modes; ++k) {
-        moved += e->shells->scan.gains[lung][axis] * e->shells->scan.weights[k] * row[k];
+        moved += e->shells->scan.gains[lung][axis] * weights[k] * row[k];
       }
       e->vertices[3 * i + axis] = (float)(e->content->points[3 * e->order[i] + axis] - moved);
     }
@@ -196,7 +197,7 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
 static void take_field(const embedding *e, size_t lung, size_t count, const double *positions,
                        double *values) {
   const size_t modes = e->columns / 3;
-  const double *weights = e->shells->scan.weights;
+  const double *weights = supine_basis_lung_weights(e->shells->basis, &e->shells->scan, lung);
   const char *name = supine_basis_get_info(e->shells->basis)->lung_names[lung];
   if (e->options->field != NULL) {
     for (size_t i = 0; i < count; ++i) {

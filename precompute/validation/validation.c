@@ -27,7 +27,8 @@ void supine_validation_free(supine_validation *subject) {
 supine_status supine_validation_begin(supine_validation *subject, supine_error *error) {
   supine_validation *s = subject;
   supine_pose pose;
-  if (s->from.text[0] == '\0') {
+  const bool scan = s->from.text[0] == '\0';
+  if (scan) {
     s->from.state = supine_basis_scan(s->basis);
   }
   /* If the volume at rest is unknown, a state without a volume gets the volume of the scan. */
@@ -35,7 +36,11 @@ supine_status supine_validation_begin(supine_validation *subject, supine_error *
       !supine_basis_get_info(s->basis)->has_rest) {
     s->from.state.volume.kind = SUPINE_VOLUME_SCAN;
   }
-  SUPINE_TRY(supine_basis_pose(s->basis, &s->from.state, &pose, error));
+  if (scan) {
+    SUPINE_TRY(supine_basis_scan_pose(s->basis, &pose, error));
+  } else {
+    SUPINE_TRY(supine_basis_pose(s->basis, &s->from.state, &pose, error));
+  }
   s->from_millilitres = supine_posed_volume(s->basis, &pose);
   s->from_scale = pose.gains[0][0];
   return supine_posed_mesh(s->basis, &pose, &s->start, error);

@@ -161,6 +161,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    "%s needs an output that ends in .html", of_page);
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_EXACT, &basis, error));
   SUPINE_REFUSE_IF(supine_basis_get_info(basis)->is_fields &&
+                       supine_basis_get_info(basis)->order == 0 &&
                        (wanted->breathes || wanted->glb.animate),
                    error, SUPINE_ERROR_ARGUMENT,
                    "%s holds another simulator's fields of gravity, which have no breaths: leave "

@@ -162,15 +162,19 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
   return SUPINE_OK;
 }
 
-/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. */
+/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. Fields of gravity and
+ * volume breathe if it is asked, or if the volume at rest is known. */
 static supine_status set_volume(const supine_basis *basis, const supine_stream_session *wanted,
                                 supine_stream_volume *volume, supine_error *error) {
   supine_pv pv = *supine_breath_normal();
-  if (supine_basis_get_info(basis)->is_fields) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const bool breathes =
+      !info->is_fields || (info->order > 0 && (wanted->has_breath || info->has_rest));
+  SUPINE_REFUSE_IF(
+      wanted->has_breath && !breathes, error, SUPINE_ERROR_ARGUMENT,
+      "the basis was made with --fields and has no breaths: leave out --tidal, --rate and --pv");
+  if (info->is_fields && (wanted->has_volume || !breathes)) {
     supine_pose pose;
-    SUPINE_REFUSE_IF(
-        wanted->has_breath, error, SUPINE_ERROR_ARGUMENT,
-        "the basis was made with --fields and has no breaths: leave out --tidal, --rate and --pv");
     volume->fixed = wanted->volume;
     volume->fixed.gravity[1] = 1.0;
     return supine_basis_pose(basis, &volume->fixed, &pose, error);

@@ -178,11 +178,13 @@ static void compute_points(supine_stream_frames *f, supine_stream_frame *frame) 
   supine_parallel_for(f->info->vertex_count, GRAIN, 0, compute_range, &p);
 }
 
-/* Write the NDARRAY of mode weights and displacement factors; return its size in bytes. */
+/* Write the NDARRAY of mode weights, of each lung if they differ, and of displacement factors;
+ * return its size in bytes. */
 static size_t put_weights(const supine_stream_frames *f, const supine_stream_snapshot *snapshot,
                           unsigned char *bytes) {
-  const size_t modes = f->info->mode_count;
-  const size_t count = modes + 3 * f->info->lung_count;
+  const size_t lungs = f->info->lung_count;
+  const size_t modes = f->info->mode_count * (f->info->order > 0 ? lungs : 1);
+  const size_t count = modes + 3 * lungs;
   /* Type 10 (32-bit floats), one dimension, and its size in two bytes. */
   const unsigned char head[4] = {10, 1, (unsigned char)(count >> 8), (unsigned char)count};
   float values[SUPINE_MODES_MAX + 3 * SUPINE_LUNGS_MAX];

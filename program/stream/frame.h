@@ -2,8 +2,9 @@
 /** @file
  * Encode a state of the lungs as OpenIGTLink messages, once for any number of peers.
  *
- * A message of weights is an NDARRAY of floats: the weight of each mode, then three gains of each
- * lung, the factors that multiply the displacement along x, y and z. A message of points is a
+ * A message of weights is an NDARRAY of floats: the weight of each mode (for each lung, if
+ * supine_basis_info.order is above 0), then three gains of each lung, the factors that multiply the
+ * displacement along x, y and z. A message of points is a
  * POLYDATA. If the lungs were fitted to observed points, it has the expected error of each vertex
  * as an attribute. The triangle strips are computed once. */
 #ifndef SUPINE_STREAM_FRAME_H

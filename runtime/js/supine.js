@@ -81,10 +81,14 @@ class Basis {
     this.#read(state);
     const fixed = state.gain !== undefined;
     if (fixed) this.#number(state.gain, 'gain');
-    this.#check(fixed ? this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose)
-      : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error),
-    fixed && 'gravity is zero or not finite: give a vector with a direction');
-    if (fixed) this.#c.supine_pose_fill(this.#nextPose, state.gain);
+    if (fixed) {
+      const status = this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose);
+      this.#check(status, STATUS[status] === 'unsupported' ? 'displacements of this basis depend on the volume: give a volume instead of a gain'
+        : 'gravity is zero or not finite: give a vector with a direction');
+      this.#c.supine_pose_fill(this.#nextPose, state.gain);
+    } else {
+      this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+    }
     new Uint8Array(this.#c.memory.buffer).copyWithin(this.#state, this.#nextState, this.#nextState + STATE + POSE);
     return this;
   }
@@ -122,11 +126,21 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
+  /** Return expectedError(since), or NaN for each vertex of another simulator's fields, whose error is unknown. */
+  #expectedOrUnknown(since) {
+    try {
+      return this.expectedError(since);
+    } catch (error) {
+      if (error.status !== 'unsupported') throw error;
+      return new Float32Array(this.vertexCount).fill(NaN);
+    }
+  }
+
   targets(since) {
     const after = this.deform().slice();
-    const sigma = this.expectedError(since);
-    if (since === undefined) this.#c.supine_basis_scan(this.#nextState, this.#basis);
-    this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+    const sigma = this.#expectedOrUnknown(since);
+    this.#check(since === undefined ? this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error)
+      : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
     this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
     const [part, names] = [this.tensor('part')?.data ?? [], this.tensor('names')?.data ?? new Uint8Array()];
     const anatomy = this.tensor('anatomy')?.data ?? [];

@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 import {
-  evaluate, fieldsBasis, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
+  breathingFieldsBasis, deformed, evaluate, fieldsBasis, folder, inOrder, largestDistance, load, loadCommon, matchPoints, randomDirections, randomSource, supine,
 } from './support.mjs';
 import { harmonics } from './harmonics.mjs';
 
@@ -191,6 +191,44 @@ async function checkFields(basis) {
   for (const option of [['--breath', '700'], ['--animate']]) assert.throws(() => supine('export', basis, ...option, '-o', path), /no breaths: leave --breath and --animate out/);
 }
 
+/** Return the weights of the morph targets of each lung of another simulator's fields over gravity and volume at which it
+ * holds `volumes`, mL, as the extras describe. */
+function simulatedWeights({ band, order, modes, modeUnit }, lungs, gravity, volumes) {
+  const y = harmonics(band, gravity);
+  return lungs.map(({ userData: { supine: own } }, lung) => {
+    const at = (x) => {
+      const t = [1, x];
+      for (let n = 2; n <= order; ++n) t.push(2 * x * t[n - 1] - t[n - 2]);
+      return modes.map((row) => modeUnit * sum(row.map((c, j) => c * y[Math.floor(j / (order + 1))] * t[j % (order + 1)])));
+    };
+    const x = root((t) => own.referenceVolume + formAt(volumeForm(own, at(t)), [1, 1, 1]) - volumes[lung], 0.5);
+    return at(x).map((v, k) => (v - own.offset[k]) / own.unit[k]);
+  });
+}
+
+/** Check positions of another simulator's fields over gravity and volume, whose lungs have weights of their own, against
+ * those of 'supine deform'. */
+async function checkBreathingFields(storage) {
+  const [basis, path] = ['breathing.safetensors', 'breathing.glb'].map((name) => join(folder, name));
+  breathingFieldsBasis(basis, 1000, storage);
+  supine('export', basis, '-o', path, '--animate', '--breath', '400');
+  await validate(path);
+  const { gltf, lungs, extras } = await open(path);
+  assert.match(extras.gains, /^s = 1 and t = 0/);
+  assert.ok(extras.order > 0 && extras.breathVolume === 400 && gltf.animations.length === 5);
+  const order = matchPoints(together(lungs, extras), evaluate(basis, [[[0, 1, 0], 0.001]])[0].xyz, FIELDS_MM); // a total, which is shared as in the simulations
+  let worst = 0;
+  for (const [gravity, volumes] of [[[0, 1, 0], [2700, 3300]], [[0, -1, 0], [3500, 3400]], [[1, 0, 0], [2800, 4000]], [[0, 0, -1], [3700, 4200]], [[0.48, -0.6, 0.64], [3200, 3600]]]) {
+    const weights = simulatedWeights(extras, lungs, gravity, volumes);
+    for (const w of weights) assert.ok(w.every((x) => x >= 0 && x <= 1), `weights ${w}`);
+    setWeights(lungs, weights);
+    const truth = deformed(basis, '--gravity', gravity.join(), '--volume', `left=${volumes[0]}mL,right=${volumes[1]}mL`);
+    worst = Math.max(worst, largestDistance(together(lungs, extras), inOrder(truth, order)));
+  }
+  console.log(`fields over volume, ${storage}: ${lungs[0].morphTargetInfluences.length} targets, ${statSync(path).size} bytes, ${worst.toExponential(2)} mm`);
+  assert.ok(worst < FIELDS_MM, `${storage}: ${worst} mm off`);
+}
+
 /** Check that each clip turns gravity downwards, keeps the lungs above the table, and gives the
  * same positions as the library. */
 async function checkAnimations(basis) {
@@ -239,6 +277,7 @@ await checkAnimations(modes);
 const fields = join(folder, 'vectors.safetensors');
 fieldsBasis(fields, 600);
 await checkFields(fields);
+for (const storage of ['modes', 'clusters']) await checkBreathingFields(storage);
 await checkColours(modes);
 
 /* The animated file of the default phantom, which demonstrations use, has at most 500 kB. */

@@ -17,7 +17,7 @@ static bool write_positions(const supine_basis *basis, const double g[3], double
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_volume_kind from = info->has_rest ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN;
   supine_state state = {.gravity = {g[0], g[1], g[2]}};
-  if (!info->is_fields) {
+  if (!info->is_fields || info->order > 0) {
     state.volume = (supine_volume){from, depth};
   }
   supine_pose pose;

@@ -5,7 +5,7 @@
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { folder, skip, supine } from '../export/support.mjs';
+import { breathingFieldsBasis, folder, skip, supine } from '../export/support.mjs';
 
 if (!existsSync(process.env.TARBALL)) skip('no package: clang, lld, wasi-libc and libclang-rt-dev-wasm32 make it');
 export const packed = join(folder, 'node_modules/supine');
@@ -25,6 +25,12 @@ export const bases = [[demo, states], [inside, states], [unrested, ofScan]];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `${side}.ply`));
 bases.push([join(folder, 'real.safetensors'), states]);
 supine('precompute', ...real, '-o', bases.at(-1)[0]);
+
+
+/** Bases of fields over gravity and volume, stored as modes and as clusters. */
+export const breathing = ['modes', 'clusters'].map((storage) => join(folder, `breathing-${storage}.safetensors`));
+breathing.forEach((path, i) => breathingFieldsBasis(path, 1000, ['modes', 'clusters'][i]));
+bases.push(...breathing.map((path) => [path, ['supine', 'prone:scan+900', 'left:left=3000mL,right=3900mL']]));
 
 /** Run npm_native, the program in plain C, for one state. In its results, `expected` [N] are expected errors, mm. */
 export function native(basis, state, lungs) {

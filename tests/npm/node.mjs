@@ -7,7 +7,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { brotliCompressSync } from 'node:zlib';
 import { checkAll, pose } from './agree.mjs';
-import { demo, inside, native, packed } from './made.mjs';
+import { breathing, content, demo, inside, native, packed } from './made.mjs';
 import { folder, largestDistance, loadCommon, supine } from '../export/support.mjs';
 
 const { open, SupineError } = await import(join(packed, 'supine.js'));
@@ -77,6 +77,19 @@ for (const [since, from] of [['supine:rest', ['--from', 'supine:rest']], [undefi
   assert.deepEqual(targets.filter(({ anatomy }) => anatomy).map(({ name }) => name), ['lungs']); // a mesh as large as the lungs
   targets.forEach(({ at, move, mm, expectedError }, i) => [...at, ...move, mm, expectedError].forEach((x, k) => assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`)));
 }
+
+/* Fields over gravity and volume have no gain. Targets inside them move by the weights of their lung, from the scan. */
+const [breaths, breathed] = [await open(readFileSync(breathing[1])), join(folder, 'breathed.safetensors')];
+assert.throws(() => breaths.pose({ gravity: [0, 1, 0], gain: 1 }), { status: 'unsupported', message: /give a volume instead of a gain/ });
+supine('embed', breathing[1], content, '-o', breathed);
+supine('deform', breathed, '--posture', 'left', '--volume', 'left=3000mL,right=3900mL', '-o', table);
+const rowsOf = readFileSync(table, 'utf8').trim().split('\n').slice(2).map((line) => line.split(','));
+const moved = (await open(readFileSync(breathed))).pose('left:left=3000mL,right=3900mL').targets();
+assert.equal(moved.length, rowsOf.length);
+moved.forEach(({ at, move, mm, expectedError }, i) => {
+  [...at, ...move, mm].forEach((x, k) => assert.ok(Math.abs(x - rowsOf[i][2 + k]) < 5e-3, `${rowsOf[i]}: ${x}`));
+  assert.ok(Number.isNaN(expectedError));
+});
 
 /* A basis of an open surface has no volumes. A pose needs a gain, the displacement factor. */
 const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));

@@ -54,6 +54,17 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
+# A basis of clusters has computed coefficients. In fields over gravity and volume, each lung has weights of its own.
+for name, shape in (("clusters", (5,)), ("simulated", (2, 2))):
+    other = supine.open(f"{name}.safetensors", storage="exact")
+    asked = other.pose("prone", "scan+100")
+    weights, gains = other.weights(asked), other.gains(asked)
+    assert weights.shape == shape and other.coefficients.shape == (60, 3, shape[-1]) and other.order == len(shape[1:]) * 2
+    expected = other.vertices.astype(float)
+    for i, part in enumerate(other.lungs.values()):
+        expected[part] += gains[i] * (other.coefficients[part].astype(float) @ (weights if weights.ndim == 1 else weights[i]))
+    assert np.abs(other.deform(asked) - expected).max() < 1e-3
+
 # Results have the same bits as in C, for a basis from a file, for a basis from memory, and for ranges of vertices.
 STATE = "prone:rest+321.5"
 pose, supine_rest = lungs.pose(STATE), lungs.pose("supine")

@@ -120,9 +120,13 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
 }
 
 /* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s along the
- * vertex's direction or, if `axes` is 3, along each axis. */
+ * vertex's direction or, if `axes` is 3, along each axis, by the weights of all lungs or of each.
+ */
 static GLuint make_program(const gl_api *gl, const char *version, const char *library,
-                           size_t vectors, size_t axes) {
+                           size_t vectors, size_t axes, bool by_lung) {
+  static const char own[] = "vec3(supine_amount(supine_first(rest), c0),\n"
+                            "     supine_amount(supine_first(rest), y0),\n"
+                            "     supine_amount(supine_first(rest), z0))";
   static const char *const arguments[][4] = {
       {"direction, c0", "direction, c0, c1", "direction, c0, c1, c2", "direction, c0, c1, c2, c3"},
       {"vec3(supine_amount(c0), supine_amount(y0), supine_amount(z0))",
@@ -141,8 +145,9 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
   char vertex[2048];
   char defines[256];
   (void)snprintf(defines, sizeof defines,
-                 "#define SUPINE_LUNGS %d\n#define SUPINE_VECTORS %zu\n#define SUPINE_WORDS %d\n",
-                 LUNGS, vectors, WORDS);
+                 "#define SUPINE_LUNGS %d\n#define SUPINE_VECTORS %zu\n#define SUPINE_WORDS %d\n"
+                 "#define SUPINE_BY_LUNG %d\n",
+                 LUNGS, vectors, WORDS, by_lung ? 1 : 0);
   (void)snprintf(vertex, sizeof vertex,
                  "in vec4 rest; in vec4 c0; in vec4 c1; in vec4 c2; in vec4 c3; %s\n"
                  "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
@@ -157,7 +162,7 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
                  axes == 3 ? "in vec4 y0; in vec4 y1; in vec4 y2; in vec4 y3;\n"
                              "in vec4 z0; in vec4 z1; in vec4 z2; in vec4 z3;"
                            : "in vec3 direction;",
-                 arguments[axes / 2][vectors - 1]);
+                 by_lung ? own : arguments[axes / 2][vectors - 1]);
   const GLuint program = gl->CreateProgram();
   gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
   gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
@@ -193,11 +198,12 @@ static void make_framebuffer(const gl_api *gl) {
 /* Inputs of the vertex shader. */
 typedef struct model {
   size_t modes;
-  size_t axes;       /* 3 for a basis with three coefficients for each mode, otherwise 1 */
-  size_t head;       /* floats of a vertex before its coefficients */
-  float *attributes; /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
-  uint32_t *words;   /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
-  float weights[SUPINE_GL_MODES];
+  size_t axes;        /* 3 for a basis with three coefficients for each mode, otherwise 1 */
+  size_t head;        /* floats of a vertex before its coefficients */
+  float *attributes;  /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
+  uint32_t *words;    /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
+  size_t weight_rows; /* LUNGS if each lung has weights of its own, otherwise 1 */
+  float weights[LUNGS * SUPINE_GL_MODES];
   float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];
 } model;
@@ -251,7 +257,8 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
   gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
   gl->UseProgram(program);
-  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"), vectors, m->weights);
+  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"),
+                 vectors * (GLsizei)m->weight_rows, m->weights);
   gl->Uniform3fv(gl->GetUniformLocation(program, "supine_gains"), LUNGS, m->gains);
   gl->Uniform3fv(gl->GetUniformLocation(program, "supine_normal_weights"), LUNGS * WORDS,
                  m->normal_weights);
@@ -273,9 +280,10 @@ static const double normal_rounding = 1e-4;
 static void check_modes(const gl_api *gl, const char *version, const char *library, size_t modes,
                         bool vector) {
   model m = {.modes = modes,
+             .weight_rows = 1,
              .axes = vector ? 3 : 1,
              .head = vector ? SUPINE_GL_VECTOR_FLOATS : SUPINE_GL_FLOATS};
-  const GLuint program = make_program(gl, version, library, (modes + 3) / 4, m.axes);
+  const GLuint program = make_program(gl, version, library, (modes + 3) / 4, m.axes, false);
   fixture *f = fixture_create(VERTICES, modes, 3, LUNGS, vector, false, 9, 21);
   fixture_add_normals(f, NORMALS, 5);
   size_t size = 0;
@@ -323,6 +331,48 @@ static void check_modes(const gl_api *gl, const char *version, const char *libra
   fixture_destroy(f);
 }
 
+/* Assert that lungs of fields over gravity and volume, at different volumes, have the positions of
+ * the C library. */
+static void check_simulated(const gl_api *gl, const char *version, const char *library) {
+  static const double filled[LUNGS] = {0.85, 1.1};
+  model m = {.modes = 2, .weight_rows = LUNGS, .axes = 3, .head = SUPINE_GL_VECTOR_FLOATS};
+  const GLuint program = make_program(gl, version, library, 1, 3, true);
+  fixture *f = fixture_create_simulated(VERTICES, 21);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  const supine_basis_options exact = {sizeof exact, .storage = SUPINE_STORAGE_EXACT};
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory_with(bytes, size, &exact, &basis, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_state state = {.gravity = {0.6, -0.3, 0.2}, .lung_count = LUNGS};
+  supine_pose pose;
+  for (size_t lung = 0; lung < LUNGS; ++lung) {
+    strcpy(state.lungs[lung].name, info->lung_names[lung]);
+    state.lungs[lung].volume =
+        (supine_volume){SUPINE_VOLUME_ABSOLUTE, filled[lung] * info->reference_volume[lung]};
+  }
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, NULL), SUPINE_OK);
+  m.attributes = fixture_allocate(VERTICES * (m.head + 3 * m.modes), sizeof *m.attributes);
+  m.words = fixture_allocate((size_t)VERTICES * WORDS * 3, sizeof *m.words);
+  float *gpu = fixture_allocate(6 * VERTICES, sizeof *gpu);
+  float *cpu = fixture_allocate(3 * VERTICES, sizeof *cpu);
+  assert_int_equal(supine_gl_pack(basis, 0, VERTICES, m.attributes), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, &pose, m.weights, m.gains), SUPINE_OK);
+  run_shader(gl, program, &m, gpu);
+  assert_int_equal(supine_deform(basis, &pose, cpu), SUPINE_OK);
+  for (size_t i = 0; i < 3 * (size_t)VERTICES; ++i) {
+    assert_true(fabs((double)gpu[6 * (i / 3) + i % 3] - (double)cpu[i]) <=
+                2 * supine_basis_error(basis, &pose));
+  }
+  free(m.attributes);
+  free(m.words);
+  free(gpu);
+  free(cpu);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
 static void check_glsl(EGLenum api, const char *version) {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
@@ -341,6 +391,7 @@ static void check_glsl(EGLenum api, const char *version) {
     check_modes(&gl, version, (const char *)library, modes[i], false);
     check_modes(&gl, version, (const char *)library, modes[i], true);
   }
+  check_simulated(&gl, version, (const char *)library);
   free(library);
   (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   (void)eglDestroyContext(display, context);

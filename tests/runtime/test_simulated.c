@@ -3,6 +3,7 @@
  * fixture_create_simulated are known functions of their weights. */
 #include "tests/helpers/test.h"
 
+#include <supine/locate.h>
 #include <supine/runtime.h>
 
 #include "tests/helpers/runtime_fixture.h"
@@ -302,15 +303,100 @@ TEST(test_deform_simulated_each_lung_by_its_weights) {
   end();
 }
 
-/* Functions for one weight of each mode say that they do not support this basis. */
+/* The function for one weight of each mode says that it does not support this basis. */
 TEST(test_weights_simulated_unsupported) {
   begin();
   double weights[2];
-  float numbers[64 * 16];
-  const supine_pose pose = {.basis = 0};
   assert_int_equal(supine_basis_weights(basis, oblique, weights), SUPINE_ERROR_UNSUPPORTED);
-  assert_int_equal(supine_gl_weights(basis, &pose, numbers, numbers), SUPINE_ERROR_UNSUPPORTED);
-  assert_int_equal(supine_gl_pack(basis, 0, 60, numbers), SUPINE_ERROR_UNSUPPORTED);
+  end();
+}
+
+/* The uniforms of supine.glsl are the weights of each lung, padded to vec4s. */
+TEST(test_gl_weights_simulated_each_lung_padded) {
+  begin();
+  const supine_state asked = named(SUPINE_VOLUME_SCAN, -10, 10);
+  supine_pose pose;
+  float weights[8];
+  float gains[6];
+  assert_int_equal(supine_basis_pose(basis, &asked, &pose, NULL), SUPINE_OK);
+  assert_int_equal(supine_gl_weights(basis, &pose, weights, gains), SUPINE_OK);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double *own = supine_basis_lung_weights(basis, &pose, lung);
+    const float want[4] = {(float)own[0], (float)own[1], 0, 0};
+    assert_memory_equal(weights + 4 * lung, want, sizeof want);
+  }
+  assert_true(weights[0] < weights[4]);
+  end();
+}
+
+/* In the scan the lungs have the reference surface, as displacements count from it. */
+TEST(test_scan_pose_simulated_is_reference_surface) {
+  begin();
+  supine_pose pose;
+  float xyz[3 * 60];
+  assert_int_equal(supine_basis_scan_pose(basis, &pose, NULL), SUPINE_OK);
+  assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+  for (size_t i = 0; i < 3 * 60; ++i) {
+    assert_true(fabs((double)xyz[i] - (double)f->vertex[i]) <= supine_basis_error(basis, &pose));
+  }
+  end();
+}
+
+/* Observed points tell a volume that is not given, in the range that was simulated. */
+TEST(test_locate_simulated_volume_found) {
+  enum { POINTS = 20 };
+  begin();
+  const double all = reference[0] + reference[1];
+  for (int side = -1; side <= 1; side += 2) {
+    const supine_state held = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, (1 + 0.1 * side) * all);
+    supine_observation observed[POINTS];
+    supine_locate_residual residuals[POINTS];
+    const supine_location *found = NULL;
+    float xyz[3 * 60];
+    supine_pose pose;
+    supine_error error = {0};
+    assert_int_equal(supine_basis_pose(basis, &held, &pose, NULL), SUPINE_OK);
+    assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+    for (size_t j = 0; j < POINTS; ++j) {
+      const float *at = xyz + 9 * j;
+      observed[j] = (supine_observation){.vertex = 3 * j, .noise = 1};
+      for (size_t axis = 0; axis < 3; ++axis) {
+        observed[j].position[axis] = (double)at[axis];
+      }
+    }
+    const supine_locate_task task = {.inside = basis,
+                                     .state = state_of(oblique, SUPINE_VOLUME_DEFAULT, 0),
+                                     .observed = observed,
+                                     .count = POINTS};
+    double *space = fixture_allocate(supine_locate_space(POINTS), sizeof *space);
+    if (supine_locate(&task, residuals, space, &found, &error) != SUPINE_OK) {
+      fail_msg("%s", error.message);
+    }
+    const supine_location_info *fit = supine_location_get_info(found);
+    assert_true(fabs(fit->volume - (1 + 0.1 * side) * all) < fit->volume_error);
+    assert_true(side * (fit->volume - all) > 0.03 * all);
+    free(space);
+  }
+  end();
+}
+
+/* Totals at the ends of the range are accepted, although their shares are rounded. */
+TEST(test_total_at_ends_of_range_accepted) {
+  begin();
+  for (int i = 0; i < 500; ++i) {
+    const double angle = 0.0123 * i;
+    const double g[3] = {sin(angle), cos(angle), 0};
+    for (int side = -1; side <= 1; side += 2) {
+      const double part = 1 + 0.2 * side + 0.02 * g[1];
+      const double total = part * (reference[0] + reference[1]);
+      const supine_state asked = state_of(g, SUPINE_VOLUME_ABSOLUTE, total);
+      supine_pose pose;
+      supine_error error;
+      if (supine_basis_pose(basis, &asked, &pose, &error) != SUPINE_OK) {
+        fail_msg("%s", error.message);
+      }
+    }
+  }
   end();
 }
 

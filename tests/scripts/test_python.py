@@ -62,6 +62,8 @@ with tempfile.TemporaryDirectory() as folder:
     run(supine, "precompute", "lungs.ply", "-o", "lungs.safetensors", "--band", "3")
     run(supine, "precompute", "lungs.ply", "-o", "other.safetensors", "--band", "2")
     run(supine, "embed", "lungs.safetensors", "--grid", "12", "-o", "grid.safetensors")
+    for name in ("clusters", "simulated"):
+        shutil.copy(f"{source}/tests/golden/basis_{name}.safetensors", os.path.join(folder, f"{name}.safetensors"))
     print(wheel, run(python, f"{source}/tests/python/inside.py", "./reference", "lungs.safetensors", "program"))
     # With the offline library beside the package, the same results are made in process.
     package = os.path.dirname(run(python, "-c", "import supine; print(supine.__file__)"))

@@ -22,9 +22,10 @@ enum { VERTICES = 6000, MODES = 6, LUNGS = 2, FLOATS = MODES + 3 * LUNGS };
 
 /* Spherical-harmonic coefficients of the volume of each lung at rest. It exceeds the volume of the
  * reference surface by 10 mL plus 4 mL times the y component of gravity. */
-static const double resting[9 * LUNGS] = {
-    [0] = 10.0 / 0.2820947917738781, [1] = 4.0 / 0.4886025119029199,
-    [9] = 10.0 / 0.2820947917738781, [10] = 4.0 / 0.4886025119029199};
+static const double resting[9 * LUNGS] = {[0] = 10.0 / 0.2820947917738781,
+                                          [1] = 4.0 / 0.4886025119029199,
+                                          [9] = 10.0 / 0.2820947917738781,
+                                          [10] = 4.0 / 0.4886025119029199};
 
 /* A server that runs in a thread of its own, and the basis that it uses. */
 typedef struct stage {
@@ -57,14 +58,29 @@ static void *run(void *context) {
   return NULL;
 }
 
+/* Open the basis of s->made, and set the options of its server. */
+static void stage_open(stage *s) {
+  size_t size = 0;
+  supine_error error;
+  s->bytes = fixture_bytes(s->made, &size);
+  assert_int_equal(supine_basis_open_memory(s->bytes, size, &s->basis, &error), SUPINE_OK);
+  s->options = (supine_stream_options){.listen = "0",
+                                       .name = "SUPINE",
+                                       .setup = supine_stream_setup_default(),
+                                       .volume = &s->volume,
+                                       .rate = 1000.0,
+                                       .seconds = 600.0, /* ends a test that hangs */
+                                       .warn = count_warning,
+                                       .stop = is_ending,
+                                       .context = s};
+}
+
 /* Create the server; its options may be changed before it runs. */
 static stage *stage_create(void) {
   stage *s = fixture_allocate(1, sizeof *s);
-  size_t size = 0;
-  supine_error error;
   s->made = fixture_create(VERTICES, MODES, 2, LUNGS, false, true, 15.0, 29);
-  /* Make the constant (degree 0) coefficient of the weight of each mode dominate, and let every mode
-   * enlarge both lungs, so that no pose folds the surface. */
+  /* Make the constant (degree 0) coefficient of the weight of each mode dominate, and let every
+   * mode enlarge both lungs, so that no pose folds the surface. */
   for (size_t i = 0; i < LUNGS * 3 * MODES; ++i) {
     s->made->linear[i] = fabs(s->made->linear[i]);
   }
@@ -82,18 +98,8 @@ static stage *stage_create(void) {
     mode[0] = 3.0;
   }
   s->made->resting = resting;
-  s->bytes = fixture_bytes(s->made, &size);
-  assert_int_equal(supine_basis_open_memory(s->bytes, size, &s->basis, &error), SUPINE_OK);
   s->volume = (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, 30.0}}};
-  s->options = (supine_stream_options){.listen = "0",
-                                       .name = "SUPINE",
-                                       .setup = supine_stream_setup_default(),
-                                       .volume = &s->volume,
-                                       .rate = 1000.0,
-                                       .seconds = 600.0, /* ends a test that hangs */
-                                       .warn = count_warning,
-                                       .stop = is_ending,
-                                       .context = s};
+  stage_open(s);
   return s;
 }
 
@@ -366,6 +372,54 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
   (void)close(peer);
   (void)stage_end(s);
   assert_int_equal(atomic_load(&s->warnings), 0);
+  stage_destroy(s);
+}
+
+/* In fields over gravity and volume, weights and points are those of each lung at its own volume.
+ */
+TEST(test_server_simulated_two_volumes_equal_basis_pose) {
+  enum { COUNT = 60, NUMBERS = 2 * 2 + 3 * 2 };
+  stage *s = fixture_allocate(1, sizeof *s);
+  s->made = fixture_create_simulated(COUNT, 29);
+  stage_open(s);
+  const supine_basis_info *info = supine_basis_get_info(s->basis);
+  const double *reference = info->reference_volume;
+  s->volume.fixed.lung_count = 2;
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double ml = (lung == 0 ? 0.9 : 1.1) * reference[lung];
+    strcpy(s->volume.fixed.lungs[lung].name, info->lung_names[lung]);
+    s->volume.fixed.lungs[lung].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, ml};
+  }
+  const int peer = connect_peer(stage_run(s));
+  const unsigned char head[4] = {10, 1, 0, NUMBERS};
+  supine_stream_header header;
+  unsigned char body[4096];
+  for (uint64_t i = 0; i < 4; ++i) {
+    supine_state asked = s->volume.fixed;
+    supine_pose pose;
+    float xyz[3 * COUNT];
+    memcpy(asked.gravity, poses[i], sizeof asked.gravity);
+    assert_int_equal(supine_basis_pose(s->basis, &asked, &pose, NULL), SUPINE_OK);
+    assert_int_equal(supine_deform(s->basis, &pose, xyz), SUPINE_OK);
+    assert_true(send_text(peer, "SEND", "weights"));
+    assert_true(send_pose(peer, poses[i], 1 + 2 * i));
+    (void)receive_stamp(peer, 1 + 2 * i, &header, body);
+    assert_memory_equal(body, head, sizeof head);
+    for (size_t k = 0; k < NUMBERS; ++k) {
+      const double wanted = k < 4 ? pose.weights[k] : pose.gains[(k - 4) / 3][(k - 4) % 3];
+      assert_true(fabs((double)float_at(body + 4 + 4 * k) - wanted) <= 1e-6 * fabs(wanted) + 1e-9);
+    }
+    assert_true(fabs(pose.weights[0] - pose.weights[2]) > 0.05);
+    assert_true(send_text(peer, "SEND", "points"));
+    assert_true(send_pose(peer, poses[i], 2 + 2 * i));
+    (void)receive_stamp(peer, 2 + 2 * i, &header, body);
+    assert_string_equal(header.type, "POLYDATA");
+    for (size_t k = 0; k < 3 * (size_t)COUNT; ++k) {
+      assert_true(float_at(body + 40 + 4 * k) == xyz[k]);
+    }
+  }
+  (void)close(peer);
+  (void)stage_end(s);
   stage_destroy(s);
 }
 

@@ -13,9 +13,14 @@ enum { VOLUME_TARGETS_MAX = 32 };
 
 enum { RESTING_TERMS = 9 }; /* number of spherical harmonics of bands 0 to 2 */
 
+/* Return whether the lungs breathe. Another simulator's fields of gravity alone do not. */
+static bool breathes(const glb *g) {
+  return !g->info->is_fields || g->info->order > 0;
+}
+
 /* Return whether the extras have the volume formula. */
 static bool has_volume(const glb *g) {
-  return g->targets.count <= VOLUME_TARGETS_MAX && !g->info->is_fields;
+  return g->targets.count <= VOLUME_TARGETS_MAX && breathes(g);
 }
 
 static const char frame_text[] =
@@ -31,6 +36,20 @@ static const char weights_text[] =
     "axis a is A[a] = s + t * bend[a]; s = t = 0 is the reference surface.";
 static const char fields_text[] =
     "s = 1 and t = 0: another simulator's fields of gravity, without volumes and breaths";
+static const char simulated_text[] =
+    "s = 1 and t = 0: another simulator's fields of gravity and volume. Each lung has its own v[k] "
+    "= "
+    "modeUnit * sum over i and n of modes[k][i * (order + 1) + n] * Y[i](g) * T[n](x), where T[0] "
+    "= "
+    "1, T[1] = x, T[n] = 2 x T[n-1] - T[n-2]. A lung that holds V mL more than its referenceVolume "
+    "has nearly x = 2 (V - range[0]) / (range[1] - range[0]) - 1; solve for the x at which "
+    "'volume' "
+    "gives V. In the direction g, the simulations held V from low to high, with low = sum over i "
+    "of "
+    "limits[i] * Y[i](g) and high = sum over i of limits[9 + i] * Y[i](g)";
+static const char simulated_rest_text[] =
+    "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of resting[l*l+l+m] "
+    "* Y[l*l+l+m](g)";
 static const char volume_text[] =
     "volume of a lung minus its referenceVolume, mL: sum over axes a of L[a] A[a], plus Q[0] A[1] "
     "A[2] + Q[1] A[0] A[2] + Q[2] A[0] A[1] + C A[0] A[1] A[2], where L[a] = sum linear[a][k] "
@@ -55,11 +74,18 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-json_t *supine_export_glb_extras(const glb *g) {
-  const supine_basis_info *info = g->info;
-  const size_t terms = supine_sh_count(info->band);
-  const char *full = supine_basis_metadata(g->basis, "full_upright_gain");
-  const double unit = 1e-8; /* value of one integer step in `modes` */
+/* Return what the extras say about the gains of another simulator's fields; NULL for other bases.
+ */
+static const char *gains_text(const glb *g) {
+  if (g->info->order > 0) {
+    return simulated_text;
+  }
+  return g->info->is_fields ? fields_text : NULL;
+}
+
+/* Return the coefficients of the weights, as multiples of `unit`. */
+static json_t *describe_modes(const supine_basis_info *info, double unit) {
+  const size_t terms = supine_sh_count(info->band) * (info->order + 1);
   json_t *modes = json_array();
   for (size_t k = 0; k < info->mode_count; ++k) {
     json_t *row = json_array();
@@ -68,17 +94,35 @@ json_t *supine_export_glb_extras(const glb *g) {
     }
     (void)json_array_append_new(modes, row);
   }
-  const bool fields = info->is_fields;
+  return modes;
+}
+
+json_t *supine_export_glb_extras(const glb *g) {
+  const supine_basis_info *info = g->info;
+  const char *full = supine_basis_metadata(g->basis, "full_upright_gain");
+  const double unit = 1e-8; /* value of one integer step in `modes` */
   const bool rest = info->has_rest;
-  return json_pack(
+  const bool shares = rest && info->order == 0; /* how a total is divided among the lungs */
+  const char *rest_text = rest ? simulated_rest_text : NULL;
+  if (shares) {
+    rest_text = resting_text;
+  }
+  json_t *extras = json_pack(
       "{s:{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o, s:s*, s:o*, s:s*, s:s*, s:o*, s:o*}}",
       "supine", "frame", frame_text, "weights", weights_text, "band", (int)info->band, "modes",
-      modes, "modeUnit", unit, "bend", supine_options_json_numbers(3, info->bend), "middle",
+      describe_modes(info, unit), "modeUnit", unit, "bend",
+      supine_options_json_numbers(3, info->bend), "middle",
       supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step, "basis",
-      supine_options_json_metadata(g->basis), "gains", fields ? fields_text : NULL, "breathVolume",
-      fields ? NULL : json_real(g->options->breath), "volume", has_volume(g) ? volume_text : NULL,
-      "rest", rest ? resting_text : NULL, "byLung", rest ? json_true() : NULL, "fullUprightGain",
-      rest ? json_real(full != NULL ? supine_number_parse(full, NULL) : 0) : NULL);
+      supine_options_json_metadata(g->basis), "gains", gains_text(g), "breathVolume",
+      breathes(g) ? json_real(g->options->breath) : NULL, "volume",
+      has_volume(g) ? volume_text : NULL, "rest", rest_text, "byLung", rest ? json_true() : NULL,
+      "fullUprightGain",
+      shares ? json_real(full != NULL ? supine_number_parse(full, NULL) : 0) : NULL);
+  if (info->order > 0) {
+    (void)json_object_set_new(json_object_get(extras, "supine"), "order",
+                              json_integer((json_int_t)info->order));
+  }
+  return extras;
 }
 
 json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
@@ -93,6 +137,14 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
     (void)json_object_set_new(
         supine, "resting",
         supine_options_json_numbers(RESTING_TERMS, resting + lung * RESTING_TERMS));
+  }
+  if (info->order > 0) {
+    const double *range = supine_basis_tensor(g->basis, "simulated_range")->data;
+    const double *limits = supine_basis_tensor(g->basis, "simulated_limits")->data;
+    (void)json_object_set_new(supine, "range", supine_options_json_numbers(2, range + 2 * lung));
+    (void)json_object_set_new(
+        supine, "limits",
+        supine_options_json_numbers(2 * RESTING_TERMS, limits + lung * 2 * RESTING_TERMS));
   }
   if (has_volume(g)) {
     (void)json_object_update_new(

@@ -160,8 +160,9 @@ static void find_steps(page *p) {
 
 /* Add the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
 static supine_status add_doubles(page *p) {
-  static const char *const names[] = {"modes", "resting_volume", "volume_linear",
-                                      "volume_quadratic", "volume_cubic"};
+  static const char *const names[] = {
+      "modes",        "resting_volume",  "volume_linear",    "volume_quadratic",
+      "volume_cubic", "simulated_range", "simulated_limits", "simulated_shares"};
   for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
     const supine_tensor *tensor = supine_basis_tensor(p->basis, names[i]);
     if (tensor != NULL) {
@@ -261,18 +262,18 @@ static double scan_volume(const page *p) {
 /* Return the states from which displacements can be measured, as JSON. */
 static json_t *describe_froms(const page *p) {
   json_t *list = json_array();
+  const size_t weights = p->info->mode_count * (p->info->order > 0 ? p->info->lung_count : 1);
   for (size_t i = 0; i < p->shown->from_count; ++i) {
     const supine_options_reference_pose *from = &p->shown->from[i];
     const supine_volume volume = from->state.volume;
     const bool rest = from->state.lung_count == 0 &&
                       (volume.kind == SUPINE_VOLUME_REST || volume.kind == SUPINE_VOLUME_DEFAULT);
     (void)json_array_append_new(
-        list,
-        json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", from->name, "gravity",
-                  supine_options_json_numbers(3, from->state.gravity), "above",
-                  rest ? json_real(volume.ml) : json_null(), "weights",
-                  supine_options_json_numbers(p->info->mode_count, from->pose.weights), "gains",
-                  supine_options_json_numbers(3 * p->info->lung_count, from->pose.gains[0])));
+        list, json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", from->name, "gravity",
+                        supine_options_json_numbers(3, from->state.gravity), "above",
+                        rest ? json_real(volume.ml) : json_null(), "weights",
+                        supine_options_json_numbers(weights, from->pose.weights), "gains",
+                        supine_options_json_numbers(3 * p->info->lung_count, from->pose.gains[0])));
   }
   return list;
 }
@@ -280,16 +281,18 @@ static json_t *describe_froms(const page *p) {
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, s:o, "
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, "
+      "s:o, "
       "s:o, "
       "s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
       "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
       (json_int_t)info->vertex_count, "triangles",
       (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
-      (json_int_t)info->mode_count, "band", (json_int_t)info->band, "vector", (int)info->vector,
-      "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
-      begins(info, p->order.corner_begin), "hasResting", (int)info->has_rest, "colours", colours(),
-      "breathVolume", p->shown->breath, "metadata", supine_options_json_metadata(p->basis), "title",
+      (json_int_t)info->mode_count, "band", (json_int_t)info->band, "order",
+      (json_int_t)info->order, "vector", (int)info->vector, "lungBegin",
+      begins(info, p->order.lung_begin), "cornerBegin", begins(info, p->order.corner_begin),
+      "hasResting", (int)info->has_rest, "colours", colours(), "breathVolume", p->shown->breath,
+      "metadata", supine_options_json_metadata(p->basis), "title",
       supine_options_json_text(p->shown->title), "middle",
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
       p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
@@ -356,10 +359,6 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
       p.info->mode_count > MODES_MAX, error, SUPINE_ERROR_UNSUPPORTED,
       "a page shows up to %d modes, not %zu: precompute the basis with --modes %d, or export .glb",
       MODES_MAX, p.info->mode_count, MODES_MAX);
-  SUPINE_REFUSE_IF(
-      p.info->order > 0, error, SUPINE_ERROR_UNSUPPORTED,
-      "a page shows fields over gravity alone, not over gravity and volume: draw films "
-      "with 'supine render', or export the surface of one state with 'supine deform'");
   SUPINE_TRY(supine_export_pack_begin(error));
   SUPINE_TRY(find_coefficients(&p, error));
   SUPINE_TRY(supine_export_order_make(p.info, true, shown->simplify, &p.arena, &p.order, error));

@@ -8,6 +8,7 @@
 #include "base/vec3.h"
 #include "program/options/breath_turn.h"
 #include "program/view/render/render.h"
+#include "runtime/simulated.h"
 
 enum { DIRECTIONS = 4096 }; /* number of sampled directions of gravity */
 /* The range of each weight in the sampled directions is extended by this fraction at both ends. */
@@ -19,6 +20,7 @@ static void find_amounts(const export_targets *targets, const supine_pose *pose,
   const size_t k = targets->info->mode_count;
   const double *bend = targets->info->bend;
   const double *gains = pose->gains[lung];
+  const double *weights = supine_basis_lung_weights(targets->basis, pose, lung);
   size_t low = 0;
   size_t high = 0;
   for (size_t axis = 1; axis < 3; ++axis) {
@@ -29,13 +31,61 @@ static void find_amounts(const export_targets *targets, const supine_pose *pose,
   const double t = low == high ? 0 : (gains[high] - gains[low]) / (bend[high] - bend[low]);
   const double s = gains[low] - t * bend[low];
   for (size_t j = 0; j < targets->count; ++j) {
-    amounts[j] = (j < k ? s : t) * pose->weights[j % k];
+    amounts[j] = (j < k ? s : t) * weights[j % k];
   }
+}
+
+/* Find the lowest and the highest volume of all lungs that was simulated for a direction of
+ * gravity, mL above that of the reference surface. */
+static supine_status find_simulated(const supine_basis *basis, const double g[3], double range[2]) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  range[0] = range[1] = 0;
+  SUPINE_TRY(supine_simulated_limits(basis, g, limits));
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    range[0] += limits[lung][0];
+    range[1] += limits[lung][1];
+  }
+  return SUPINE_OK;
+}
+
+/* Compute the pose of another simulator's fields at a volume of all lungs, mL above that of the
+ * reference surface. */
+static supine_status pose_at_total(const supine_basis *basis, const double g[3], double total,
+                                   supine_pose *pose, supine_error *error) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {SUPINE_VOLUME_ABSOLUTE, total}};
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    state.volume.ml += info->reference_volume[lung];
+  }
+  return supine_basis_pose(basis, &state, pose, error);
+}
+
+/* Compute the pose during a breath in another simulator's fields. The breath begins at rest, or in
+ * the scan if rest is unknown, or as near to it as the simulated volumes allow. */
+static supine_status simulated_breath(const supine_basis *basis, double breath, const double g[3],
+                                      double fraction, supine_pose *pose, supine_error *error) {
+  const supine_state start = supine_options_breath_state(basis, g, 0);
+  double range[2];
+  double begin = 0;
+  SUPINE_TRY(find_simulated(basis, g, range));
+  if (supine_basis_pose(basis, &start, pose, NULL) == SUPINE_OK) {
+    double volumes[SUPINE_LUNGS_MAX];
+    SUPINE_TRY(supine_basis_volumes(basis, pose, volumes));
+    for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+      begin += volumes[lung] - supine_basis_get_info(basis)->reference_volume[lung];
+    }
+  }
+  begin = fmax(range[0], fmin(begin, range[1] - breath));
+  const double total = fmin(range[1], begin + fraction * breath);
+  return pose_at_total(basis, g, total, pose, error);
 }
 
 supine_status supine_export_breath_pose(const supine_basis *basis, double breath, const double g[3],
                                         double fraction, supine_pose *pose, supine_error *error) {
   supine_state state = supine_options_breath_state(basis, g, fraction * breath);
+  if (supine_basis_get_info(basis)->order > 0) {
+    return simulated_breath(basis, breath, g, fraction, pose, error);
+  }
   if (supine_basis_get_info(basis)->is_fields) {
     state.volume = (supine_volume){SUPINE_VOLUME_DEFAULT, 0};
   }
@@ -51,10 +101,24 @@ void supine_export_targets_weights(const export_targets *targets, const supine_p
   }
 }
 
+/* Compute the pose at a fraction of the volumes that the morph targets must show for a direction of
+ * gravity: those of the breath or, in another simulator's fields, all that were simulated. */
+static supine_status sample_pose(const export_targets *targets, const double g[3], double fraction,
+                                 supine_pose *pose, supine_error *error) {
+  if (targets->info->order > 0) {
+    double range[2];
+    SUPINE_TRY(find_simulated(targets->basis, g, range));
+    return pose_at_total(targets->basis, g, range[0] + fraction * (range[1] - range[0]), pose,
+                         error);
+  }
+  return supine_export_breath_pose(targets->basis, targets->breath, g, fraction, pose, error);
+}
+
 /* Find the smallest and the largest factor of each displacement field in any sampled direction of
- * gravity and phase of the breath. Within a large breath, some factors pass an extremum; 10 steps
- * miss it by less than `margin`. Set `offset` to the smallest factor, at which the morph target has
- * weight 0, and `unit` to the difference from the largest, at which it has weight 1. */
+ * gravity and phase of the breath, or simulated volume. Within a large breath, some factors pass an
+ * extremum; 10 steps miss it by less than `margin`. Set `offset` to the smallest factor, at which
+ * the morph target has weight 0, and `unit` to the difference from the largest, at which it has
+ * weight 1. */
 static supine_status find_ranges(export_targets *targets, supine_error *error) {
   enum { STEPS = 10, PHASES = STEPS + 1 };
   double amounts[EXPORT_TARGETS_MAX];
@@ -62,8 +126,7 @@ static supine_status find_ranges(export_targets *targets, supine_error *error) {
   for (size_t i = 0; i < PHASES * (size_t)DIRECTIONS; ++i) {
     double g[3];
     supine_spiral((double)(i / PHASES), DIRECTIONS, 0, g);
-    SUPINE_TRY(supine_export_breath_pose(targets->basis, targets->breath, g,
-                                         (double)(i % PHASES) / STEPS, &pose, error));
+    SUPINE_TRY(sample_pose(targets, g, (double)(i % PHASES) / STEPS, &pose, error));
     for (size_t lung = 0; lung < targets->info->lung_count; ++lung) {
       export_weights *w = &targets->lung[lung];
       find_amounts(targets, &pose, lung, amounts);
@@ -92,8 +155,6 @@ supine_status supine_export_targets_choose(const supine_basis *basis, double bre
                                            export_targets *targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const bool bent = info->bend[0] != 0 || info->bend[1] != 0 || info->bend[2] != 0;
-  SUPINE_REFUSE_IF(info->order > 0, error, SUPINE_ERROR_UNSUPPORTED,
-                   "morph targets show fields over gravity alone, not over gravity and volume");
   targets->basis = basis;
   targets->info = info;
   targets->breath = breath;

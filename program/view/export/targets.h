@@ -26,7 +26,8 @@ enum { EXPORT_TARGETS_MAX = 2 * SUPINE_MODES_MAX };
  *     target_j = unit_j field_j            weight_j = (amount_j - offset_j) / unit_j
  *
  * Offset and unit keep the weights within [0, 1], to which viewers clamp them, for every direction
- * of gravity and every volume of the breath. */
+ * of gravity and every volume of the breath. In another simulator's fields over gravity and volume,
+ * whose weights differ by lung and follow its volume, they do so for every simulated volume. */
 typedef struct export_weights {
   double offset[EXPORT_TARGETS_MAX];
   double unit[EXPORT_TARGETS_MAX];

@@ -68,7 +68,8 @@ function readBasis() {
   basis.surface = takeRows('vertices', n, 3, basis.placeUnit, basis.middle);
   const directions = basis.vector ? [] : takeCounts('direction', n, 4, 'OCTAHEDRAL');
   basis.direction = Float32Array.from({ length: directions.length / 4 * 3 }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
-  basis.fields = basis.metadata.route === 'fields'; // made from another simulator's fields, which have no volumes and no breaths
+  basis.fields = basis.metadata.route === 'fields'; // made from another simulator's fields
+  basis.breathes = !basis.fields || basis.order > 0; // fields of gravity alone have no volumes and no breaths
   basis.coefficients = takeRows('coefficients', (basis.vector ? 3 : 1) * n, basis.modes, basis.unit);
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
@@ -78,6 +79,7 @@ function readBasis() {
   basis.resting = basis.hasResting ? takeTensor('resting_volume', Float64Array) : null;
   basis.byLung = basis.resting?.length > 9;
   basis.lungs = basis.lungBegin.length - 1;
+  if (basis.order > 0) basis.simulated = takeSimulated(basis);
   const names = (basis.metadata.lungs ?? '').split(',');
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
   const same = (a, b) => ['weights', 'gains'].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-6));
@@ -134,6 +136,10 @@ function harmonics(band, [x, y, z]) {
   }
   return values;
 }
+
+/** Return the part of the weights of a moment that belongs to a lung: fields over gravity and volume have weights of each
+ * lung, [lungs, modes], all other bases the same weights for all. */
+const weightsOf = ({ modes, order }, { weights }, lung) => (order > 0 ? weights.slice(lung * modes, (lung + 1) * modes) : weights);
 
 /** Return the weights of the modes for gravity along a unit vector. */
 function weightsFor(basis, gravity) {
@@ -289,8 +295,9 @@ function gainsFor(basis, forms, volumes, total) {
  * volume `depth` mL above rest. `weights` are those of the modes, `gains` the factors of the displacement of each lung
  * along x, y, z, `held` the volume (gas and tissue) of each lung, mL, and `above` is `depth`. `folds`: whether the
  * surface folds before.
- * Another simulator's fields are not scaled to a volume. */
+ * Another simulator's fields of gravity alone are not scaled to a volume. */
 function momentFor(basis, gravity, depth) {
+  if (basis.order > 0) return simulatedMoment(basis, gravity, depth);
   const weights = weightsFor(basis, gravity);
   const forms = basis.references.map((_, lung) => lungForm(basis, lung, weights));
   const volumes = volumesFor(basis, gravity);
@@ -320,13 +327,18 @@ function fieldOf({ coefficients, direction, modes, vector, vertices }, weights, 
 }
 
 /** Compute the positions of the vertices `begin` to `end`, by default of all, in a state of the lungs, mm. */
-function placesOf(basis, { weights, gains }, begin = 0, end = basis.vertices) {
+function placesOf(basis, moment, begin = 0, end = basis.vertices) {
   const places = new Float32Array(3 * (end - begin));
   const field = [0, 0, 0];
-  for (let v = begin, lung = lungOf(basis, begin); v < end; ++v) {
-    while (v >= basis.lungBegin[lung + 1]) ++lung;
+  let lung = lungOf(basis, begin);
+  let weights = weightsOf(basis, moment, lung);
+  for (let v = begin; v < end; ++v) {
+    if (v >= basis.lungBegin[lung + 1]) {
+      lung = lungOf(basis, v);
+      weights = weightsOf(basis, moment, lung);
+    }
     fieldOf(basis, weights, v, field);
-    for (let axis = 0; axis < 3; ++axis) places[3 * (v - begin) + axis] = basis.surface[3 * v + axis] + gains[3 * lung + axis] * field[axis];
+    for (let axis = 0; axis < 3; ++axis) places[3 * (v - begin) + axis] = basis.surface[3 * v + axis] + moment.gains[3 * lung + axis] * field[axis];
   }
   return places;
 }

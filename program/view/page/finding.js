@@ -6,7 +6,7 @@
 const PUBLISHED = { left: 'left 0 % (SD 44), right +25 % (SD 11); Little 2021, n\u00a010' };
 
 /** Return the volume (gas plus tissue) of each lung, mL. */
-const heldBy = (basis, { weights, gains }) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weights), gains.slice(3 * lung, 3 * lung + 3)));
+const heldBy = (basis, moment) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weightsOf(basis, moment, lung)), moment.gains.slice(3 * lung, 3 * lung + 3)));
 
 /** Return a weight for each vertex, proportional to the area of the triangles around it. */
 function areasOf({ surface, corners, vertices }) {
@@ -65,7 +65,8 @@ function rmsBetween(basis, now, from) {
   const { modes, squares } = basis;
   let sum = 0;
   for (let row = 0, at = 0; row < 3 * basis.lungs; ++row) {
-    const by = Float64Array.from({ length: modes }, (_, k) => now.gains[row] * now.weights[k] - from.gains[row] * from.weights[k]);
+    const [to, past] = [now, from].map((moment) => weightsOf(basis, moment, Math.floor(row / 3)));
+    const by = Float64Array.from({ length: modes }, (_, k) => now.gains[row] * to[k] - from.gains[row] * past[k]);
     for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sum += by[k] * by[l] * squares[at];
   }
   return Math.sqrt(Math.max(0, sum));
@@ -248,14 +249,15 @@ class Holds {
   /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from which
    * displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume at rest
    * has a normal distribution; the range is one standard deviation to either side. */
-  show({ lungNames, references, metadata }, held, depth, before, heights) {
+  show({ lungNames, references, simulated, metadata }, held, depth, before, heights) {
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
     this.rows.forEach(({ who, band, was, now, ml }, lung) => {
       const [from, to] = [before[lung], held[lung]];
       const above = (depth * to) / sumOf(held);
       const ends = [-1, 1].map((sign) => above + (to - above) * Math.exp(sign * Number(metadata.resting_spread)));
       const known = !metadata.resting_spread;
-      const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / references[lung]))}%`;
+      const most = references[lung] + Math.max(0, simulated?.range[2 * lung + 1] ?? 0);
+      const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / most))}%`;
       who.textContent = `${lungNames[lung]}${apart ? ` (${heights[lung] > heights[1 - lung] ? 'up' : 'down'})` : ''}`;
       ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`}`;
       was.style.left = at(from);

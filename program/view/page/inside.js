@@ -6,9 +6,10 @@ const BALL_RADIUS = 7; // radius of the ball drawn at a point, mm
 const DOT_RADIUS = 1.5; // radius of the balls drawn at the points of anatomy, mm
 
 /** Read the parts inside the lungs from the page. Sort points before meshes, so that each kind needs one draw call. */
-function takeInside({ inside, modes: k, placeUnit, middle }) {
+function takeInside(basis) {
+  const { inside, modes: k, placeUnit, middle } = basis;
   const { vertices: n } = inside;
-  inside.modes = k;
+  Object.assign(inside, { modes: k, order: basis.order });
   const [places, fields, of, corners] = [takeRows('inside-vertices', n, 3, placeUnit, middle), takeRows('inside-coefficients', 3 * n, k, inside.unit),
     takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
   const meshed = new Uint8Array(n);
@@ -60,11 +61,14 @@ function normalsOf({ reference, vertices, corners }) {
 }
 
 /** Return the position, mm, of a vertex displaced by the modes, even if its part is rigid. */
-function fieldPlace({ reference, fields, vertices, modes: k }, { weights, gains }, vertex) {
+function fieldPlace(inside, moment, vertex) {
+  const { reference, fields, vertices, modes: k } = inside;
+  const lung = reference[4 * vertex + 3];
+  const weights = weightsOf(inside, moment, lung);
   return [0, 1, 2].map((axis) => {
     let sum = 0;
     for (let m = 0, at = (axis * vertices + vertex) * k; m < k; ++m) sum += weights[m] * fields[at + m];
-    return reference[4 * vertex + axis] + gains[3 * reference[4 * vertex + 3] + axis] * sum;
+    return reference[4 * vertex + axis] + moment.gains[3 * lung + axis] * sum;
   });
 }
 

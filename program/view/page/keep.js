@@ -32,8 +32,8 @@ function takeLink(text, state) {
   if (posture) state.settle(posture.q, posture.tilt, 0);
   const reference = postureFrom(link.get('reference') ?? '');
   if (reference) state.pinnedQ = tilted(reference.q, reference.tilt);
-  state.tidal = within(numbers('tidal')[0], 1e-3, state.depthMax, state.tidal);
-  state.depth = within(numbers('depth')[0], 0, state.depthMax, state.depth);
+  state.tidal = within(numbers('tidal')[0], 1e-3, state.tidalMax, state.tidal);
+  state.depth = within(numbers('depth')[0], state.depthMin, state.depthMax, state.depth);
   if (KINDS[link.get('colour')]) state.kind = link.get('colour');
   state.room = link.get('room') !== '0';
   state.roomBlend = state.room ? 1 : 0;

@@ -301,7 +301,7 @@ function start() {
   /** Once the posture has settled, write the texts, bars, cards and outlines that describe the lungs. During a breath,
    * and while a tracker moves the patient, they describe the end of an expiration. */
   function tellSettled(now) {
-    const depth = state.playing || state.live ? 0 : state.depth;
+    const depth = state.playing || state.live ? state.expired : state.depth;
     const wish = { gravity: state.gravity, depth, from: state.from, chosen: state.chosen };
     if (!alike(wish, next)) [next, since] = [wish, now];
     if (alike(wish, told) || state.turning || now - since < (state.live ? 700 : 0)) return;
@@ -314,7 +314,7 @@ function start() {
       table.press();
     }
     const target = inside ? targetOf(inside, state.chosen, moved) : null;
-    const above = Math.round(depth) ? `${amount(depth)} above ${restOrScan}` : '';
+    const above = Math.round(moment.above) ? `${amount(Math.abs(moment.above))} ${moment.above < 0 ? 'below' : 'above'} ${restOrScan}` : '';
     const sentence = sentenceOf(basis, moved, target, state.gravity, above);
     writeSentence($('finding'), sentence);
     write('meaning', sentence.meaning);
@@ -343,7 +343,9 @@ function start() {
     write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD between people.' : ''}${measured ? ` Published change: ${measured}.` : ''}`);
   }
 
-  const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} + ${amount(state.depth)}` : ''}`;
+  const limitWords = ([low, high]) => `${restOrScan} ${[low, high].map((ml) => `${ml < 0 ? '\u2212' : '+'}${Math.abs(ml).toFixed(0)}`).join(' to ')} mL`;
+
+  const volumeWords = () => `${amount(state.tidal)}, ${state.rate} a minute${Math.round(state.depth) ? `; now ${restOrScan} ${state.depth < 0 ? '\u2212' : '+'} ${amount(Math.abs(state.depth))}` : ''}`;
 
   const last = {};
   /** Call act(value) if `value` has changed since the last call for the same name `what`. `last` stores the values,
@@ -429,7 +431,12 @@ function start() {
     before = now;
     if (stale) {
       const good = state.compute();
-      $('message').hidden = good;
+      const { limited } = state.moment ?? {};
+      $('message').hidden = good && !limited;
+      if (good && limited) {
+        $('message').className = 'plate';
+        $('message').textContent = `In this posture ${limitWords(limited)} was simulated: the nearest volume is shown.`;
+      }
       if (!good) {
         $('message').className = 'trouble plate';
         $('message').textContent = `No breath of ${amount(state.depth)} in this posture: the surface would fold. Choose a smaller volume.`;
@@ -594,7 +601,7 @@ function start() {
   const slide = (id, act) => onSlider(id, (value) => { act(value); touch(); });
   slide('tilt', (value) => state.settle(state.standing.q, value, 0));
   slide('depth', (value) => { state.playing = false; state.depth = value; remeasure(); });
-  slide('tidal', (value) => { state.tidal = value; if (!state.playing) state.depth = value; remeasure(); });
+  slide('tidal', (value) => { state.tidal = value; if (!state.playing) state.depth = state.expired + value; remeasure(); });
   slide('rate', (value) => { state.rate = value; });
   $('posture-name').addEventListener('change', () => {
     const found = postureFrom($('posture-name').value);
@@ -608,10 +615,10 @@ function start() {
   });
   $('posture-name').addEventListener('blur', () => { last.posture = null; redraw(); }); // replaces a typed text that may be invalid
   const play = () => {
-    if (basis.fields) return;
+    if (!basis.breathes) return;
     state.playing = !state.playing;
     remeasure();
-    const part = Math.min(1, state.depth / state.tidal);
+    const part = Math.max(0, Math.min(1, (state.depth - state.expired) / state.tidal));
     if (state.playing) state.phase = Math.acos(1 - 2 * part) / (2 * Math.PI);
     touch();
   };
@@ -744,8 +751,9 @@ function start() {
     else if (VIEWS[event.key.toUpperCase()] && event.key.length === 1) lookFrom(event.key.toUpperCase());
   });
 
-  if (basis.fields) for (const part of document.querySelectorAll('.breath, section[aria-labelledby=breath-title]')) part.hidden = true;
-  for (const id of ['depth', 'tidal']) for (const end of [id, `${id}-number`]) $(end).max = state.depthMax;
+  if (!basis.breathes) for (const part of document.querySelectorAll('.breath, section[aria-labelledby=breath-title]')) part.hidden = true;
+  for (const [id, most] of [['depth', state.depthMax], ['tidal', state.tidalMax]]) for (const end of [id, `${id}-number`]) $(end).max = most;
+  for (const end of ['depth', 'depth-number']) $(end).min = state.depthMin;
   for (const end of ['tidal', 'tidal-number']) $(end).min = $(end).step = state.tidal / 50;
   for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
   for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
@@ -753,7 +761,7 @@ function start() {
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
   write('patient-fit', basis.metadata.patient ? `fitted to this patient: ${basis.metadata.patient}` : '');
-  write('state', basis.fields ? `another simulator\u2019s fields of gravity, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  write('state', basis.fields ? `another simulator\u2019s fields of gravity${basis.order > 0 ? ' and volume' : ''}, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;
@@ -811,7 +819,7 @@ function pictureOn(canvas, basis) {
 }
 
 /** Return the error of the displacement by the modes, in words. */
-const errorOf = ({ metadata, fields }) => metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS${fields ? `, ${Number(metadata.error_max_mm).toPrecision(2)} mm at most, each direction from the others` : ' from the full solve, on held-out directions'}`;
+const errorOf = ({ metadata, fields, order }) => metadata.error_rms_percent && `${Number(metadata.error_rms_percent).toPrecision(2)} % RMS${fields ? `, ${Number(metadata.error_max_mm).toPrecision(2)} mm at most, each direction${order > 0 ? ' and volume' : ''} from the others` : ' from the full solve, on held-out directions'}`;
 
 function showFacts(basis) {
   const { metadata } = basis;

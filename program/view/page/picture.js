@@ -39,13 +39,13 @@ class Picture {
   /** Return what capture() needs to deform vertices: the shader program, a texture of their coefficients, [axes, vertices,
    * modes], which are multiples of `unit`, mm, and `array`, the vertex array. */
   deformed(coefficients, vertices, axes, unit, array) {
-    const { gl, basis: { modes, lungs } } = this;
+    const { gl, basis: { modes, lungs, order } } = this;
     const vectors = Math.ceil(modes / 4);
     const rows = axes * vertices;
     const height = Math.ceil((rows * vectors) / WIDTH) || 1;
     const counts = new Int16Array(4 * WIDTH * height);
     for (let i = 0; i < rows; ++i) for (let k = 0; k < modes; ++k) counts[4 * vectors * i + k] = Math.round(coefficients[modes * i + k] / unit);
-    const text = [`#define SUPINE_LUNGS ${lungs}`, `#define SUPINE_VECTORS ${vectors}`, `#define AXES ${axes}`, source('supine.glsl'), source('vertex.vert.glsl')];
+    const text = [`#define SUPINE_LUNGS ${lungs}`, `#define SUPINE_BY_LUNG ${order > 0 ? 1 : 0}`, `#define SUPINE_VECTORS ${vectors}`, `#define AXES ${axes}`, source('supine.glsl'), source('vertex.vert.glsl')];
     return { ...this.program('vertex.vert.glsl', null, ['moved'], text.join('\n')), array, count: vertices, vertices, every: 1, unit,
       coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, counts) };
   }
@@ -314,8 +314,10 @@ class Picture {
     const { gl } = this;
     gl.useProgram(program);
     if (moment) {
-      const weights = new Float32Array(4 * Math.ceil(this.basis.modes / 4));
-      weights.set(moment.weights);
+      const { basis } = this;
+      const stride = 4 * Math.ceil(basis.modes / 4);
+      const weights = new Float32Array(stride * (basis.order > 0 ? basis.lungs : 1));
+      for (let lung = 0; lung * stride < weights.length; ++lung) weights.set(weightsOf(basis, moment, lung), lung * stride);
       gl.uniform4fv(at.supine_weights, weights);
       gl.uniform3fv(at.supine_gains, moment.gains);
       gl.uniform1i(at.vertices, vertices);

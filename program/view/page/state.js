@@ -78,9 +78,7 @@ class State {
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // chosen posture; tilt in degrees
     this.q = POSTURES[2].q;                        // rotation shown now; while `turning`, on the way to the chosen posture
     this.turning = null;
-    this.tidal = basis.breathVolume;
-    this.depth = 0;
-    this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
+    this.takeVolumes();
     this.rate = 12;
     this.phase = 0.5;
     this.playing = false;
@@ -106,6 +104,30 @@ class State {
     this.live = false;                             // whether a tracker moves the patient
     this.measure();
     this.slices = null;                            // x, y, z of the sagittal, coronal and axial plane, mm; null for those through the chosen structure
+  }
+
+  /** Set the tidal volume, and the range of volumes above rest, or above the scan if rest is unknown, mL. Those of another
+   * simulator's fields are the volumes that were simulated in some of POSTURES. A breath stays in the range of all. */
+  takeVolumes() {
+    const { basis } = this;
+    this.tidal = basis.breathVolume;
+    this.depthMin = 0;
+    this.tidalMax = this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
+    this.shared = [0, Infinity]; // volumes that are within reach in each of POSTURES
+    if (basis.order > 0) {
+      const ranges = POSTURES.map((p) => simulatedRange(basis, gravityOf(tilted(p.q, p.tilt))));
+      const [lows, highs] = [0, 1].map((end) => ranges.map((range) => range[end]));
+      [this.depthMin, this.depthMax] = [Math.min(...lows), Math.max(...highs)];
+      this.shared = [Math.max(...lows), Math.max(Math.max(...lows) + 1, Math.min(...highs))];
+      this.tidalMax = this.shared[1] - this.shared[0];
+      this.tidal = Math.min(this.tidal, this.tidalMax);
+    }
+    this.depth = this.expired;
+  }
+
+  /** Volume at the end of an expiration: 0 if a breath from there stays within reach. */
+  get expired() {
+    return Math.max(this.shared[0], Math.min(0, this.shared[1] - this.tidal));
   }
 
   /** Return the opacity that the lungs have unless it was chosen: a shell, and lungs with something inside, are seen
@@ -157,7 +179,7 @@ class State {
     }
     if (this.playing) {
       this.phase = (this.phase + (seconds * this.rate) / 60) % 1;
-      this.depth = (this.tidal * (1 - Math.cos(2 * Math.PI * this.phase))) / 2;
+      this.depth = this.expired + (this.tidal * (1 - Math.cos(2 * Math.PI * this.phase))) / 2;
     }
     return moves;
   }
@@ -169,7 +191,7 @@ class State {
   /** Compute the lungs' state for the current gravity and volume. If the surface would fold, keep the previous state
    * and return false. */
   compute() {
-    if (this.basis.fields) this.depth = 0;
+    if (!this.basis.breathes) this.depth = 0;
     const moment = momentFor(this.basis, this.gravity, this.depth);
     if (moment.folds) return false;
     this.moment = moment;
@@ -189,7 +211,7 @@ class State {
   }
 
   measure() {
-    const deepest = this.playing || this.depth > 0 ? Math.max(this.tidal, this.depth) : 0;
+    const deepest = this.playing || this.depth > this.expired ? Math.max(this.expired + this.tidal, this.depth) : this.expired;
     if (deepest === this.measured && this.from === this.measuredFrom) return;
     [this.measured, this.measuredFrom] = [deepest, this.from];
     const before = samplePlaces(this.basis, this.from);

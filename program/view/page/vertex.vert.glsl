@@ -14,7 +14,7 @@ float amount(int axis) {
   int at = (axis * vertices + gl_VertexID * every) * SUPINE_VECTORS;
   float sum = 0.0;
   for (int i = at; i < at + SUPINE_VECTORS; ++i) {
-    sum += dot(supine_weights[i - at], vec4(texelFetch(coefficients, ivec2(i % width, i / width), 0)));
+    sum += dot(supine_weights[supine_first(reference) + i - at], vec4(texelFetch(coefficients, ivec2(i % width, i / width), 0)));
   }
   return unit * sum;
 }

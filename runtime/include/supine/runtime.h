@@ -292,7 +292,8 @@ SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the pose of the lungs as they are in the scan. For displacements from another simulator
  * that is the given surface, without displacement, which they need not reach in any posture; for
- * all others it is the pose of supine_basis_scan. Statuses: as supine_basis_pose. */
+ * all others it is the pose of supine_basis_scan.
+ * @retval SUPINE_ERROR_NUMERICAL  the volume of the scan cannot be reached */
 SUPINE_API supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,
                                                 supine_error *error);
 
@@ -428,13 +429,13 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 }
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
  *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
  *                    vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes, or each lung has
- *                                   weights of its own (supine_basis_info.order is above 0) */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
 /** Compute the uniforms supine_weights and supine_gains of supine.glsl.
- * @param weights  [4 ceil(mode_count / 4)], written
+ * @param weights  [4 ceil(mode_count / 4)], written; [lung_count, 4 ceil(mode_count / 4)] if
+ *                 supine_basis_info.order is above 0, which needs SUPINE_BY_LUNG in supine.glsl
  * @param gains    [lung_count, 3], written
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,

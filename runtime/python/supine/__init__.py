@@ -217,6 +217,8 @@ class Basis:
     bounds: float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs: dict from the name of each lung to the slice of its vertices
     metadata: dict from the keys of the file's metadata to the texts
+    order: highest degree of the polynomials of a lung's volume in another simulator's fields over gravity and volume; if
+        it is above 0, each lung has weights of its own
     storage_error: bound on position errors from storage and rounding, for 500 mL above the reference surface, mm
     report: what the program printed when `precompute` or `embed` made the basis
     """
@@ -232,6 +234,7 @@ class Basis:
         self.triangle_count: int = info.triangle_count
         self._size = 3 * self.vertex_count
         self.mode_count: int = info.mode_count
+        self.order: int = info.order
         self.band: int = info.band
         self.vector: bool = info.vector
         self.has_volume: bool = info.has_volume
@@ -390,8 +393,10 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """Return a view of the weights of a pose, one for each mode."""
-        return np.ctypeslib.as_array(pose.weights)[:self.mode_count]
+        """Return a view of the weights of a pose, one for each mode. In a basis of another simulator's fields over gravity
+        and volume (`order` above 0), each lung has weights of its own: [lungs, modes]."""
+        shape = (len(self.lungs), self.mode_count) if self.order > 0 else (self.mode_count,)
+        return np.ctypeslib.as_array(pose.weights)[:int(np.prod(shape))].reshape(shape)
 
     def gains(self, pose: Pose) -> Doubles:
         """Return a view of the gains [lungs, 3] of a pose: factors of each lung's displacement along x, y and z."""

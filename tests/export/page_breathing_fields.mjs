@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A page of another simulator's fields over gravity and volume, stored as modes and as clusters: positions and volumes are
+// those of the library, the two lungs open differently, the volume and the breath have their sliders, and a volume that
+// was not simulated is replaced by the nearest.
+import assert from 'node:assert/strict';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { close, evaluateFor, openLungs, settled } from './browser.mjs';
+import { breathingFieldsBasis, deformed, floatsOf, folder, largestDistance, supine } from './support.mjs';
+
+const TOLERANCE_MM = 0.02;
+const [html, points, inside, rows] = ['breathing.html', 'breathing.csv', 'breathing-inside.safetensors', 'breathing-moved.csv'].map((name) => join(folder, name));
+const states = [[[0, 1, 0], 300], [[0, -1, 0], 1200], [[1, 0, 0], 700], [[0, 0, -1], 1700], [[0.48, -0.6, 0.64], 950]];
+for (const storage of ['modes', 'clusters']) {
+  const basis = join(folder, `breathing-${storage}.safetensors`);
+  breathingFieldsBasis(basis, 1200, storage);
+  assert.equal(JSON.parse(supine('info', basis, '--json')).multiplications === 15, storage === 'clusters');
+  const surface = floatsOf(basis, 'vertices');
+  const chosen = [100, 300, 600, 900].map((v) => [v, ...surface.subarray(3 * v, 3 * v + 3)]);
+  writeFileSync(points, `name,x,y,z\n${chosen.map((row) => row.join()).join('\n')}\n`);
+  supine('embed', basis, points, '-o', inside);
+  supine('export', basis, '--inside', inside, '-o', html);
+  const { page, complaints } = await openLungs(html);
+  const truth = await evaluateFor(page, basis, states);
+  const moments = await page.evaluate((all) => all.map(([g, ml]) => ({ ...window.supine.moment(g, ml), at: Array.from(window.supine.positions(g, ml)) })), states);
+  let worst = 0;
+  moments.forEach(({ at }, i) => { worst = Math.max(worst, largestDistance(at, truth[i].xyz)); });
+  console.log(`${storage}: ${worst.toExponential(2)} mm off in ${states.length} states`);
+  assert.ok(worst < TOLERANCE_MM, `${worst} mm`);
+  assert.ok(states.every((_, i) => i === 0 || largestDistance(truth[i].xyz, truth[0].xyz) > 2), 'the states are alike');
+
+  // The lungs hold the volume that is asked, and share it as 'deform' does: the right lung lags behind.
+  const { references } = await page.evaluate(() => window.supine.basis);
+  const sum = (values) => values.reduce((total, x) => total + x, 0);
+  for (const [i, [, ml]] of states.entries()) assert.ok(Math.abs(sum(moments[i].held) - sum(references) - ml) < 1e-3);
+  const shares = moments[0].held.map((ml, lung) => (ml - references[lung]) / references[lung]);
+  assert.ok(shares[0] > 1.3 * shares[1], `${shares}`);
+
+  // The weights of each lung also move structures inside it. Points that were given on the surface stay on it.
+  supine('deform', inside, '--gravity', states[4][0].join(), '--volume', `scan+${states[4][1]}`, '-o', rows);
+  const [columns, ...parts] = readFileSync(rows, 'utf8').trim().split('\n').filter((line) => !line.startsWith('#')).map((line) => line.split(','));
+  const moved = deformed(basis, '--gravity', states[4][0].join(), '--volume', `scan+${states[4][1]}`);
+  parts.forEach((row, i) => assert.ok(largestDistance(moved.subarray(3 * chosen[i][0], 3 * chosen[i][0] + 3), ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)]))) < TOLERANCE_MM, `${row}`));
+  const within = await page.evaluate(([g, ml]) => Array.from(window.supine.insidePositions(g, ml)), states[4]);
+  parts.forEach((row, i) => assert.ok(largestDistance(within.slice(3 * i, 3 * i + 3), ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)]))) < TOLERANCE_MM, `${row}`));
+
+  // The slider has the range that was simulated, and a breath stays within what all postures can hold.
+  assert.ok(await page.locator('#depth').isVisible());
+  const sliders = await page.evaluate(() => { const { depthMin, depthMax, shared, tidal, expired } = window.supine.state; return { depthMin, depthMax, shared, tidal, expired }; });
+  assert.ok(sliders.depthMin < 0 && sliders.depthMax > 1700 && sliders.tidal === 500, JSON.stringify(sliders));
+  assert.ok(sliders.expired >= sliders.shared[0] && sliders.expired + sliders.tidal <= sliders.shared[1], JSON.stringify(sliders));
+  const most = await page.evaluate(() => window.supine.moment([0, -1, 0], 9000));
+  assert.equal(most.above, most.limited[1]);
+  await page.evaluate(() => { location.hash = 'posture=prone&depth=900&room=0'; });
+  await page.waitForFunction(() => document.getElementById('posture-name').value === 'prone');
+  await settled(page);
+  assert.match(await page.locator('#finding').textContent(), /^Prone, 900 mL above the scan, /);
+  const before = await page.evaluate(() => Array.from(window.supine.state.moment.weights));
+  await page.locator('#play').click();
+  await page.waitForFunction((weights) => weights.some((w, i) => Math.abs(w - window.supine.state.moment.weights[i]) > 1e-3), before);
+  assert.ok(await page.evaluate(() => window.supine.state.playing && window.supine.state.moment.limited === null));
+  await page.locator('#play').click();
+  assert.deepEqual(complaints, []);
+  await page.screenshot({ path: process.env.SCREENSHOT ?? join(folder, 'breathing.png') });
+  await close(page);
+}
