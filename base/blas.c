@@ -59,8 +59,8 @@ static supine_status refuse(size_t missing, size_t threads, supine_error *error)
       getrlimit(RLIMIT_AS, &addresses) == 0 && addresses.rlim_cur != RLIM_INFINITY;
   SUPINE_REFUSE_IF(
       !is_limited, error, SUPINE_ERROR_MEMORY,
-      "OpenBLAS needs another %zu MiB for %zu thread%s, and the system does not give them: close "
-      "other programs%s",
+      "OpenBLAS needs another %zu MiB of memory for %zu thread%s, and the system does not give it: "
+      "close other programs%s",
       needed, threads, plural, fewer);
   return supine_error_set(error, SUPINE_ERROR_MEMORY,
                           "OpenBLAS needs another %zu MiB of addresses for %zu thread%s, and the "

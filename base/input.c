@@ -49,10 +49,12 @@ static supine_status open_regular(const char *path, int flags, FILE **file, size
     (void)close(descriptor);
     return supine_error_memory(error, "reading %s", path);
   }
-  if (fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
+  const bool known = fstat(descriptor, &about) == 0;
+  if (!known || !S_ISREG(about.st_mode)) {
+    const supine_status status = known ? not_regular(path, error) : cannot_read(path, error);
     supine_file_close(file);
     *file = NULL;
-    return not_regular(path, error);
+    return status;
   }
   *size = (size_t)about.st_size;
   return SUPINE_OK;

@@ -203,14 +203,19 @@ def lobes(program, path, folder):
     run("precompute", path, "--labels", "lobes", "--edge", "4", "--held-out", "20", "-o", basis)
     names = "1=left upper,2=left lower,3=right upper,4=right middle,5=right lower"
     run("embed", basis, path, "--labels", names, "-o", inside)
+
+    def compared(postures):
+        lists = json.loads(run("compare", inside, "--postures", postures, "--json"))
+        return lists["targets"] + lists["anatomy"]
+
     for volume, words in (("full", "full"), ("rest", "at rest")):
-        for row in json.loads(run("compare", inside, "--postures", f"supine:{volume},upright:{volume}", "--json")):
+        for row in compared(f"supine:{volume},upright:{volume}"):
             before, after = row.get("volume_before_ml"), row.get("volume_after_ml")
             if before is not None:  # the hilum has no volume
                 out[f"{row['name']} lobe {words}, upright"] = 100 * (after / before - 1)
     for posture in ("supine", "prone"):
-        ml = {row["name"]: (row.get("volume_before_ml"), row.get("volume_after_ml")) for row in
-              json.loads(run("compare", inside, "--postures", f"{posture}:rest,{posture}:full", "--json"))}
+        ml = {row["name"]: (row.get("volume_before_ml"), row.get("volume_after_ml"))
+              for row in compared(f"{posture}:rest,{posture}:full")}
         upper, lower = (sum(ml[f"{side} {part}"][1] for side in ("left", "right")) /
                         sum(ml[f"{side} {part}"][0] for side in ("left", "right")) for part in ("upper", "lower"))
         out[f"expansion of upper / lower lobes, {posture}"] = upper / lower

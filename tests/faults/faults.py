@@ -14,6 +14,7 @@ above 0 and a message that gives the reason. A run that fails must leave no file
 than a run without faults.
 """
 import filecmp
+import itertools
 import json
 import os
 import random
@@ -191,17 +192,21 @@ def samples(folder):
 
 
 def write_fields(folder):
-    """Write displacements of the vertices of lungs.ply, which must exist, for three directions of gravity."""
+    """Write displacements of the vertices of lungs.ply, which must exist, for gravity along the diagonals of a cube."""
     data = (folder / "lungs.ply").read_bytes()
-    vertices, made = int(re.search(rb"element vertex (\d+)", data).group(1)), random.Random(5)
+    vertices = int(re.search(rb"element vertex (\d+)", data).group(1))
     points = struct.unpack_from(f"<{3 * vertices}f", data, data.index(b"end_header\n") + 11)
-    shapes = {"points": [vertices, 3], "gravity": [3, 3], "displacement": [3, vertices, 3]}
-    values = [*points, 0, 1, 0, 0, -1, 0, 1, 0, 0] + [made.uniform(-9, 9) for _ in range(9 * vertices)]
-    ends = [0, 24 * vertices, 24 * vertices + 72, 96 * vertices + 72]
-    header = json.dumps({name: {"dtype": "F64", "shape": shapes[name], "data_offsets": ends[i:i + 2]}
-                         for i, name in enumerate(shapes)}).encode()
-    (folder / "fields.safetensors").write_bytes(struct.pack(f"<Q{len(header)}s{len(values)}d", len(header),
-                                                            header, *values))
+    gravity = list(itertools.product((-1, 1), repeat=3))
+    moved = [(4 + 0.02 * points[3 * vertex]) * g for along in gravity for vertex in range(vertices) for g in along]
+    arrays = {"points": ([vertices, 3], points), "gravity": ([len(gravity), 3], itertools.chain(*gravity)),
+              "displacement": ([len(gravity), vertices, 3], moved)}
+    header, values = {}, []
+    for name, (shape, numbers) in arrays.items():
+        begin = 8 * len(values)
+        values += numbers
+        header[name] = {"dtype": "F64", "shape": shape, "data_offsets": [begin, 8 * len(values)]}
+    text = json.dumps(header).encode()
+    (folder / "fields.safetensors").write_bytes(struct.pack(f"<Q{len(text)}s{len(values)}d", len(text), text, *values))
 
 
 def main():
