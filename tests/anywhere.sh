@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Run the tests that compare text, numbers or time (label "anywhere") as on other processors, with OpenBLAS's kernels for
-# old processors and each of the library's own kernels; on one processor; and beside six busy loops. This takes about six
+# old processors and each of the library's own kernels; on one processor; and beside six busy loops. This takes about four
 # minutes on two processors. First build the project: sh cmake/debian.sh build
 set -u
 cd "$(dirname "$0")/.." || exit 1
