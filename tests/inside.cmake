@@ -14,11 +14,11 @@ add_test(NAME labels_orientation COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_labels_orientation.py $<TARGET_FILE:supine>)
 add_test(NAME foreign_tools COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_foreign_tools.py $<TARGET_FILE:supine>)
-set_tests_properties(foreign_tools PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(foreign_tools PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 add_test(NAME soft_tissue COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_soft_tissue.py
   $<TARGET_FILE:supine> ${PROJECT_SOURCE_DIR}/docs/guide ${SUPINE_LUNGS}/covid/lobes_001.nii.gz)
-set_tests_properties(soft_tissue PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(soft_tissue PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 add_test(NAME grid_axes COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_grid_axes.py $<TARGET_FILE:supine>)
-set_tests_properties(grid_axes PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
-set_tests_properties(labels_orientation PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(grid_axes PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
+set_tests_properties(labels_orientation PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)

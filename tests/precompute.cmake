@@ -8,12 +8,12 @@ supine_test(precompute/deform_lung supine_precompute supine_lungs supine_mesh_io
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME evidence COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/evidence.py --check
     ${PROJECT_BINARY_DIR} ${SUPINE_LUNGS}/lungs ${SUPINE_LUNGS}/covid:RAS)
-  set_tests_properties(evidence PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 77)
+  set_tests_properties(evidence PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 endif()
 # Fields that CalculiX computes are compressed within the error that is stated.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME fem COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/fem.py ${PROJECT_BINARY_DIR})
-  set_tests_properties(fem PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77)
+  set_tests_properties(fem PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 endif()
 supine_test(precompute/reference supine_precompute supine_lungs supine_mesh_io supine_gsl)
 supine_test(precompute/lungs supine_precompute supine_lungs supine_mesh_io)
@@ -26,7 +26,7 @@ target_compile_definitions(test_process PRIVATE SUPINE_PROGRAM="$<TARGET_FILE:su
 add_test(NAME command_output COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_command_output.sh
   $<TARGET_FILE:supine> ${CMAKE_CURRENT_SOURCE_DIR}/golden)
 add_test(NAME same_output COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_same_output.py)
-set_tests_properties(command_output PROPERTIES TIMEOUT 900)
+set_tests_properties(command_output PROPERTIES TIMEOUT ${hang})
 # Run the commands that README.md and FIGURES.md quote.
 add_test(NAME quoted COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_quoted.py $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
@@ -37,20 +37,20 @@ add_test(NAME manual COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_manual.sh 
 # Run the cohort workflow on forty subjects, if snakemake is installed.
 add_test(NAME cohort COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_cohort.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
-set_tests_properties(cohort PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(cohort PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 # Run a plan of simulations, and collect the fields.
 add_test(NAME simulations COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_simulations.sh $<TARGET_FILE:supine>
   ${PROJECT_SOURCE_DIR}/cohort)
-set_tests_properties(simulations PROPERTIES TIMEOUT 900)
+set_tests_properties(simulations PROPERTIES TIMEOUT ${hang})
 # Run the BIDS app on a small dataset.
 if(Python3_FOUND)
   add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_bids.sh $<TARGET_FILE:supine>
     ${PROJECT_SOURCE_DIR}/cohort)
-  set_tests_properties(bids PROPERTIES TIMEOUT 900)
+  set_tests_properties(bids PROPERTIES TIMEOUT ${hang})
 endif()
 add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_no_data_lost.sh
   $<TARGET_FILE:supine>)
-set_tests_properties(no_data_lost PROPERTIES TIMEOUT 900)
+set_tests_properties(no_data_lost PROPERTIES TIMEOUT ${hang})
 supine_test(base/thread_count supine_precompute supine_lungs)
 supine_test(precompute/torture supine_precompute supine_lungs supine_mesh_io)
 supine_test(precompute/projection supine_precompute supine_lungs supine_mesh_io supine_gsl)

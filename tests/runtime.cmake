@@ -41,7 +41,7 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE AND CMAKE_CXX_COMPILER)
   add_test(NAME install COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_install.sh ${CMAKE_COMMAND}
     ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR} $<TARGET_FILE:make_basis>
     ${CMAKE_C_COMPILER} ${CMAKE_CXX_COMPILER})
-  set_tests_properties(install PROPERTIES TIMEOUT 900)
+  set_tests_properties(install PROPERTIES TIMEOUT ${hang})
 endif()
 
 # Test the Python package with Debian's python.
@@ -49,13 +49,13 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME python COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_python.py
     ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine_precompute_shared>
     $<TARGET_FILE:supine> ${CMAKE_C_COMPILER})
-  set_tests_properties(python PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+  set_tests_properties(python PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 endif()
 
 # Give a right and a wrong input of each row of docs/inputs.md to every interface.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME inputs_everywhere COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/inputs.py ${PROJECT_BINARY_DIR})
-  set_tests_properties(inputs_everywhere PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 FIXTURES_REQUIRED npm_package)
+  set_tests_properties(inputs_everywhere PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 FIXTURES_REQUIRED npm_package)
 endif()
 
 # Build and run the library for other platforms, where their compilers and emulators are installed.
@@ -63,7 +63,7 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   foreach(platform gcc clang musl aarch64 windows)
     add_test(NAME platform_${platform} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_platform.sh ${platform} ${CMAKE_COMMAND}
       ${PROJECT_SOURCE_DIR} $<TARGET_FILE:supine_runtime> ${CMAKE_C_COMPILER} $<TARGET_FILE:supine>)
-    set_tests_properties(platform_${platform} PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+    set_tests_properties(platform_${platform} PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
   endforeach()
 endif()
 

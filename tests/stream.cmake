@@ -24,10 +24,10 @@ if(Python3_EXECUTABLE)
     {port} {basis})
   add_test(NAME stream_points COMMAND ${Python3_EXECUTABLE}
     ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_points.py $<TARGET_FILE:supine> ${examples}/tracker)
-  set_tests_properties(stream_points PROPERTIES TIMEOUT 900)
+  set_tests_properties(stream_points PROPERTIES TIMEOUT ${hang})
   add_test(NAME stream_web COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_web.py
     $<TARGET_FILE:supine>)
-  set_tests_properties(stream_web PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+  set_tests_properties(stream_web PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
   # Test the Unity example, compiled by Mono with stubs for the types of the engine.
   find_program(MCS_PROGRAM mcs)
   find_program(MONO_PROGRAM mono)
@@ -41,7 +41,7 @@ if(Python3_EXECUTABLE)
       ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=$<TARGET_FILE_DIR:supine_runtime_shared>
       ${MONO_PROGRAM} ${unity}/link.exe {port} {basis})
     set_tests_properties(stream_unity_link_compiles PROPERTIES FIXTURES_SETUP unity)
-    set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT 900)
+    set_tests_properties(stream_unity PROPERTIES FIXTURES_REQUIRED unity TIMEOUT ${hang})
     add_test(NAME csharp COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_csharp.sh ${PROJECT_SOURCE_DIR}
       $<TARGET_FILE:supine_runtime_shared> $<TARGET_FILE:supine> ${CMAKE_C_COMPILER} ${MCS_PROGRAM} ${MONO_PROGRAM})
   endif()
@@ -49,7 +49,7 @@ if(Python3_EXECUTABLE)
   if(NODE_PROGRAM)
     add_test(NAME stream_page COMMAND ${with_server} 1000 "--volume rest+300 --web 0"
       ${NODE_PROGRAM} ${CMAKE_CURRENT_SOURCE_DIR}/stream/stream_page.mjs {page} {port})
-    set_tests_properties(stream_page PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 ENVIRONMENT
+    set_tests_properties(stream_page PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT
       "MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
   endif()
 endif()

@@ -10,4 +10,4 @@ supine_test(precompute/validation_lungs supine_precompute supine_lungs supine_me
 # Read the file of a breath (a series of surfaces) by VTK, if Debian's Python has VTK.
 add_test(NAME series_vtk COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_series_vtk.py
   $<TARGET_FILE:supine>)
-set_tests_properties(series_vtk PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(series_vtk PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)

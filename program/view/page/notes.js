@@ -156,7 +156,7 @@ class Notes {
       return;
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
-    const lines = [[shortName(target.name, 17), '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} error`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
+    const lines = [[shortName(target.name, 17), '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} wide (error)`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
     lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
   }
 }
