@@ -31,7 +31,8 @@ VOXELS = (512, 512, 248)
 
 
 def write_image(path, label):
-    """Write a NIfTI image that covers the synthetic lungs, of 8-bit labels if `label`, else of 16-bit noise."""
+    """Write a NIfTI image that covers the synthetic lungs, of 8-bit labels if `label`, else of 16-bit noise
+    from -1024 to -769 HU, so that it holds air."""
     step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -54,7 +55,9 @@ def write_image(path, label):
                 file.write(b"".join(bytes(v + (j >> 5) + k // 16 & 63 for v in row)
                                     for j in range(VOXELS[1])))
             else:
-                file.write(os.urandom(2 * VOXELS[0] * VOXELS[1]))
+                plane = bytearray(b"\xfc" * (2 * VOXELS[0] * VOXELS[1]))  # -1024 to -769, as in air
+                plane[::2] = os.urandom(VOXELS[0] * VOXELS[1])
+                file.write(plane)
 
 
 def run(command):
