@@ -26,9 +26,9 @@ typedef struct supine_prepared {
   supine_reference reference;
   supine_scan posture; /**< with another simulator's fields: the posture of the scan, if known */
   supine_named_volumes named; /**< with another simulator's fields */
-  char fit[256];              /**< for the user: of which data `patient` was made, and its errors */
-  char assumed[800];          /**< for the user: axes, unit, displacement law, state and volumes */
-  supine_arena memory;        /**< of the arrays of the model */
+  char fit[256];       /**< for the user: from which data the patient was fitted, and errors */
+  char assumed[800];   /**< for the user: axes, unit, displacement law, state and volumes */
+  supine_arena memory; /**< of the arrays of the model */
 } supine_prepared;
 
 /** Load lungs from files, select the displacement law, set stiffness and lesions, and move the

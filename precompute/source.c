@@ -120,9 +120,13 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
                            r->options->load.millimetres_per_unit != 1.0,
                        error, SUPINE_REMEDY_MAP_UNIT, SUPINE_ERROR_ARGUMENT,
                        "a label map's header states its unit, but another unit was given");
-  SUPINE_TRY(supine_labels_surfaces(folder ? masks : r->paths,
-                                    folder ? lobes.left + lobes.right : r->count, &wanted,
-                                    r->meshes, &source->report, error));
+  const char *const *paths = r->paths;
+  size_t count = r->count;
+  if (folder) {
+    paths = masks;
+    count = lobes.left + lobes.right;
+  }
+  SUPINE_TRY(supine_labels_surfaces(paths, count, &wanted, r->meshes, &source->report, error));
   r->count = source->report.lung_count;
   r->axes = source->report.coordinates;
   for (size_t i = 0; i < r->count; ++i) {

@@ -11,7 +11,7 @@
 /** Offsets in the SUPINE_CLUSTER_NUMBERS numbers of a cluster for one mode. */
 enum {
   SUPINE_CLUSTER_MEAN = 0,    /**< m: x, y, z */
-  SUPINE_CLUSTER_SLOPE = 3,   /**< B: rows x, y and z */
+  SUPINE_CLUSTER_SLOPE = 3,   /**< B, which multiplies the position: rows x, y and z */
   SUPINE_CLUSTER_PATTERN = 12 /**< P_0, then P_1 */
 };
 

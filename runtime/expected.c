@@ -395,7 +395,7 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
   double mean[SUPINE_EXPECTED_TERMS];
   supine_pose pose;
   SUPINE_TRY(refuse_fields(basis, error));
-  SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* checks the volumes */
+  SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* refuses impossible volumes */
   return evaluate_all(basis, state, from, sigma, mean, error);
 }
 

@@ -177,7 +177,7 @@ const float *supine_basis_rows(const supine_basis *basis, size_t i, float *compu
 void supine_basis_contract(const supine_basis *basis, size_t lung, const double *weights,
                            supine_volume_form *form);
 
-/** As supine_basis_pose, without the check that lungs can hold the volumes. */
+/** Compute a pose as supine_basis_pose does, but also for volumes that lungs cannot hold. */
 supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
                                     supine_pose *pose, supine_error *error);
 

@@ -52,14 +52,31 @@ static void find_places(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
+/* Return the end of the range of points that belong to the part of point `begin`. A grid is one
+ * part. */
+static size_t end_of_part(const supine_inside_content *content, size_t begin) {
+  size_t end = begin + 1;
+  if (content->part_count == 0) {
+    return content->count;
+  }
+  while (end < content->count && content->part[end] == content->part[begin]) {
+    ++end;
+  }
+  return end;
+}
+
 /* Assign the points of each rigid part to the lung that holds most of them. */
 static void gather_parts(embedding *e) {
   const supine_inside_content *content = e->content;
-  for (size_t begin = 0, end = 0; content->rigid != NULL && begin < content->count; begin = end) {
+  if (content->rigid == NULL) {
+    return;
+  }
+  for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
     size_t count[SUPINE_LUNGS_MAX] = {0};
     size_t most = 0;
-    for (; end < content->count && content->part[end] == content->part[begin]; ++end) {
-      const size_t lung = e->lung[end];
+    end = end_of_part(content, begin);
+    for (size_t i = begin; i < end; ++i) {
+      const size_t lung = e->lung[i];
       most = ++count[lung] > count[most] ? lung : most;
     }
     if (content->rigid[content->part[begin]]) {
@@ -74,16 +91,18 @@ static void gather_parts(embedding *e) {
 
 /* Append the name of a part to `text`, if there is room. */
 static void add_name(const char *names, size_t part, char *text, size_t size) {
-  for (; part > 0 && *names != '\0'; names += *names == '\n') {
+  for (size_t i = 0; i < part; ++i) {
     names += strcspn(names, "\n");
-    --part;
+    if (*names == '\n') {
+      ++names;
+    }
   }
   const size_t length = strlen(text);
   (void)snprintf(text + length, size - length, "%s'%.*s'", length > 0 ? ", " : "",
                  (int)strcspn(names, "\n"), names);
 }
 
-/* Refuse parts whose nearest point is too far outside the lungs. A grid is one part. */
+/* Refuse parts whose nearest point is too far outside the lungs. */
 static supine_status check_distance(const embedding *e, supine_error *error) {
   const supine_inside_content *content = e->content;
   char far[160] = "";
@@ -92,10 +111,9 @@ static supine_status check_distance(const embedding *e, supine_error *error) {
   size_t parts = 0;
   for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
     double nearest = INFINITY;
-    for (; end < content->count &&
-           (content->part_count == 0 || content->part[end] == content->part[begin]);
-         ++end) {
-      nearest = fmin(nearest, -e->place[end].depth);
+    end = end_of_part(content, begin);
+    for (size_t i = begin; i < end; ++i) {
+      nearest = fmin(nearest, -e->place[i].depth);
     }
     ++parts;
     if (supine_input_judge(SUPINE_INPUT_POINT_OUTSIDE, nearest) == SUPINE_INPUT_REFUSED) {

@@ -134,9 +134,10 @@ static double difference_of(const supine_patient_pairs *pairs, size_t which) {
     }
     found += found < NEIGHBOURS;
     at = at < NEIGHBOURS ? at : NEIGHBOURS - 1;
-    for (; at > 0 && distance[at - 1] > d; --at) {
+    while (at > 0 && distance[at - 1] > d) {
       distance[at] = distance[at - 1];
       nearest[at] = nearest[at - 1];
+      --at;
     }
     distance[at] = d;
     nearest[at] = i;

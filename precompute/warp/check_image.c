@@ -74,14 +74,6 @@ static int compare(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-static bool is_hounsfield(const supine_image *image) {
-  bool aerated = false;
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
-    aerated = supine_image_get(image, i) < supine_warp_aerated;
-  }
-  return aerated;
-}
-
 /* Describe what is wrong with the image; write nothing if it fits. */
 static void describe(const sight *s, bool ct, bool scaled, char *text, size_t size) {
   const double share = (double)s->seen / (double)s->nodes;
@@ -120,7 +112,9 @@ supine_status supine_warp_check_image(const supine_image *depth, const supine_im
     return SUPINE_OK;
   }
   qsort(s.value, s.seen, sizeof *s.value, compare);
-  describe(&s, kind == SUPINE_FIELD_CT || (kind == SUPINE_FIELD_IMAGE && is_hounsfield(image)),
+  describe(&s,
+           kind == SUPINE_FIELD_CT ||
+               (kind == SUPINE_FIELD_IMAGE && supine_warp_is_hounsfield(image)),
            kind == SUPINE_FIELD_CT, text, sizeof text);
   SUPINE_REFUSE_IF(kind == SUPINE_FIELD_CT && text[0] != '\0', error, SUPINE_ERROR_FORMAT, "%s: %s",
                    path, text);

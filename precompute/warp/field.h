@@ -64,7 +64,11 @@ double supine_warp_solve(const supine_field *field, const double y[3], double x[
  * such voxels. */
 extern const double supine_warp_aerated;
 
-/** Check that an image is in Hounsfield units: at least one voxel is below supine_warp_aerated.
+/** Return whether an image is in Hounsfield units: at least one voxel is below supine_warp_aerated.
+ */
+bool supine_warp_is_hounsfield(const supine_image *image);
+
+/** Refuse an image that is not in Hounsfield units.
  * @param path  names the image in the message */
 supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
                                            supine_error *error);

@@ -349,12 +349,18 @@ supine_status supine_warp_resample(const supine_field *inverse, const supine_tis
   return status;
 }
 
+bool supine_warp_is_hounsfield(const supine_image *image) {
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    if (supine_image_get(image, i) < supine_warp_aerated) {
+      return true;
+    }
+  }
+  return false;
+}
+
 supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
                                            supine_error *error) {
-  bool aerated = false; /* whether a voxel is; the search stops there */
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2] && !aerated; ++i) {
-    aerated = supine_image_get(image, i) < supine_warp_aerated;
-  }
+  const bool aerated = supine_warp_is_hounsfield(image);
   SUPINE_REFUSE_ADVISE(
       !aerated, error, SUPINE_REMEDY_DENSITY, SUPINE_ERROR_FORMAT,
       "%s: no voxel is below %g, so the image is not in Hounsfield units: convert it", path,
