@@ -205,6 +205,18 @@ static const supine_input inputs[] = {
     .told = 0.04, .refused = NAN, .evidence = EVIDENCE("own pairs: -0.03 to 0.00, and a margin of 0.04"),
     .people = 5, .n = 10,
     .remedy = "check that both scans show one person", .interfaces = COMMAND},
+  [SUPINE_INPUT_REST_LEAST] = {
+    .name = "rest-least", .group = "Two scans", .input = "a scan whose state is named from rest",
+    .against = "the other scan", .measured = "volume at rest / at full inflation, as if supine", .below = true,
+    .told = 0.32, .refused = NAN, .evidence = EVIDENCE("healthy people: 0.48 less two SD of 0.08; COPD: from 0.49"),
+    .people = 10, .n = 10,
+    .remedy = "check the states of the scans", .interfaces = COMMAND},
+  [SUPINE_INPUT_REST_MOST] = {
+    .name = "rest-most", .group = "Two scans", .input = "a scan whose state is named from rest",
+    .against = "the other scan", .measured = "volume at rest / at full inflation, as if supine",
+    .told = 0.85, .refused = NAN, .evidence = EVIDENCE("COPD: 0.49 to 0.81, and a margin of 0.04"),
+    .people = 10, .n = 10,
+    .remedy = "check the states of the scans", .interfaces = COMMAND},
   [SUPINE_INPUT_LANDMARKS_ORDER] = {
     .name = "landmarks-order", .group = "Landmarks", .input = "landmarks from one state to another",
     .against = "the growth of the lungs", .measured = "growth the other way, standard errors beyond 0.02",

@@ -276,6 +276,11 @@ def scanned(scale, left=1.0):
     return {"command": run}
 
 
+def fitted(rest):
+    """Fit a scan at rest, called `rest`, and one at full inflation."""
+    return {"command": lambda: command("fit", "rest.ply", "lungs.ply", "--rest", rest, "--other", "supine:full", "-o", "fitted.json")}
+
+
 def paired(*words, mismatched=0):
     """Validate a basis by landmarks from the scan to rest."""
     def run():
@@ -347,6 +352,8 @@ CASES = {
     "person-depth-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1.2, 0.85)), "told"),
     "person-left-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 1), 0.65), "told"),
     "person-left-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 0.8), 1.4), "told"),
+    "rest-least": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest+1500"), "told"),
+    "rest-most": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest-2500"), "told"),
     "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
     "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
     "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"), "told"),

@@ -243,16 +243,19 @@ static supine_status find_state(supine_patient_record *record, const supine_lung
   return SUPINE_OK;
 }
 
+double supine_patient_rest_share(const supine_patient_record *record, size_t k,
+                                 const supine_resting *resting) {
+  const supine_volume *shown = &record->state[k].volume;
+  const double full = full_volume(record, 1 - k, resting);
+  const bool known = shown->kind == SUPINE_VOLUME_REST && record->volume[k] > 0.0 &&
+                     record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL && full > 0.0;
+  return known ? (record->volume[k] - shown->ml) / full : 0.0;
+}
+
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting) {
   for (size_t k = 0; k < 2; ++k) {
     const supine_state *shown = &record->state[k];
-    const double full = record->state[1 - k].volume.kind == SUPINE_VOLUME_FULL
-                            ? full_volume(record, 1 - k, resting)
-                            : 0.0;
-    if (shown->volume.kind != SUPINE_VOLUME_REST || record->volume[k] <= 0.0 || full <= 0.0) {
-      continue;
-    }
-    const double share = (record->volume[k] - shown->volume.ml) / full;
+    const double share = supine_patient_rest_share(record, k, resting);
     if (share <= share_least || share >= share_most) {
       continue;
     }

@@ -190,8 +190,15 @@ double supine_patient_expected(const supine_patient_record *record);
  * the path. If the volume is unknown, the states count as full inflation and rest. */
 void supine_patient_path(const supine_patient_record *record, double gains[2][3]);
 
-/** Scale the volumes at rest to those of the patient. They stay unchanged unless one scanned
- * state is given relative to rest and the other relative to full inflation. */
+/** Return the patient's volume at rest / at full inflation supine, of both lungs, in the posture of
+ * scanned state k. Return 0 unless that state is given relative to rest and the other one relative
+ * to full inflation, and both volumes are known.
+ * @param resting  default volumes, for the postures */
+double supine_patient_rest_share(const supine_patient_record *record, size_t k,
+                                 const supine_resting *resting);
+
+/** Scale the volumes at rest to those of the patient (supine_patient_rest_share). They stay
+ * unchanged if the share is not known, or is outside 0.15 to 0.95. */
 void supine_patient_resting(const supine_patient_record *record, supine_resting *resting);
 
 /** Describe a scan that shows one of the patient's two states.

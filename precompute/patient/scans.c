@@ -95,19 +95,22 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
   }
 }
 
-/* Warn if the volume at rest in the scans differs from the volume at rest of healthy people. */
+/* Warn if the scans and their states give a volume at rest that people hardly have. */
 static void warn_of_rest(supine_patient_scans *scans, const supine_patient_record *record) {
   const supine_resting usual = supine_physics_resting_default();
-  const double *g = record->state[1].gravity;
-  supine_resting shown = usual;
-  supine_patient_resting(record, &shown);
-  const double share[2] = {supine_physics_resting_total(&usual, g),
-                           supine_physics_resting_total(&shown, g)};
-  if (fabs(share[1] - share[0]) > SUPINE_REST_SPREAD) {
-    supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL,
-                           "warning: the volume at rest is %.0f %% of full inflation in the two "
-                           "scans, which the patient's model uses, but %.0f %% in healthy people",
-                           100.0 * share[1], 100.0 * share[0]);
+  for (size_t k = 0; k < 2; ++k) {
+    const double share = supine_patient_rest_share(record, k, &usual);
+    const double here = supine_physics_resting_total(&usual, record->state[k].gravity);
+    const double supine = share * SUPINE_REST_SHARE / here;
+    if (share != 0.0 &&
+        (supine_input_judge(SUPINE_INPUT_REST_LEAST, supine) != SUPINE_INPUT_TAKEN ||
+         supine_input_judge(SUPINE_INPUT_REST_MOST, supine) != SUPINE_INPUT_TAKEN)) {
+      supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL,
+                             "warning: the volume at rest is %.0f %% of full inflation by the two "
+                             "scans and their states, but %.0f %% in healthy people and %.0f %% in "
+                             "COPD, supine",
+                             100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
+    }
   }
 }
 
