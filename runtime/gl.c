@@ -2,12 +2,17 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "runtime/clusters.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
 
-/* Return whether the shader can hold the modes. */
+_Static_assert((int)SUPINE_GL_FRAME_FLOATS == (int)SUPINE_CLUSTER_FRAME,
+               "the texture has whole frames");
+_Static_assert(sizeof(supine_gl_clustered_vertex) == 20, "the members are packed");
+
+/* Return whether the basis has modes at each vertex, and the shader can hold them. */
 static bool fits(const supine_basis *basis) {
-  return basis->info.mode_count <= SUPINE_GL_MODES;
+  return basis->info.mode_count <= SUPINE_GL_MODES && basis->info.cluster_count == 0;
 }
 
 supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
@@ -29,8 +34,7 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
     if (!vector) {
       memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
     }
-    float computed[3 * SUPINE_MODES_MAX];
-    memcpy(to + head, supine_basis_rows(basis, i, computed), count * sizeof *to);
+    memcpy(to + head, basis->info.coefficients + i * count, count * sizeof *to);
   }
   return SUPINE_OK;
 }
@@ -50,6 +54,36 @@ supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *po
   for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
     gains[i] = (float)pose->gains[i / 3][i % 3];
   }
+  return SUPINE_OK;
+}
+
+supine_status supine_gl_pack_clusters(const supine_basis *basis, size_t begin, size_t end,
+                                      supine_gl_clustered_vertex *vertices) {
+  const supine_basis_info *info = &basis->info;
+  if (info->cluster_count == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  for (size_t i = begin; i < end; ++i) {
+    supine_gl_clustered_vertex *to = vertices + (i - begin);
+    memcpy(to->reference, info->vertices + 3 * i, sizeof to->reference);
+    memcpy(to->scalars, info->cluster_scalars + 2 * i, sizeof to->scalars);
+    to->cluster = info->cluster[i];
+    to->lung = basis->cluster_lung[to->cluster];
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_gl_frames(const supine_basis *basis, const supine_pose *pose, float *frames) {
+  const supine_basis_info *info = &basis->info;
+  if (info->cluster_count == 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  if (!supine_basis_has_pose(basis, pose)) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  /* A cluster without vertices has no frame. */
+  memset(frames, 0, info->cluster_count * SUPINE_GL_FRAME_FLOATS * sizeof *frames);
+  supine_clusters_pose(basis, pose, 0, info->vertex_count, frames);
   return SUPINE_OK;
 }
 

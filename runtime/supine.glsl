@@ -4,6 +4,7 @@
 //
 //     x = reference + gain (w . c) direction    w, c: weight of each of K modes, and its coefficient at the vertex
 //     x = reference + gain (w . cx, w . cy, w . cz)  if a mode has a coefficient for each axis
+//     x = b + A reference + a_0 Q_0 + a_1 Q_1   b, A, Q_0, Q_1: frame of a cluster of vertices; a: scalars of the vertex
 //     normal = sum over j of v_j m_j            v_j, m_j: weight of each of Q vectors, and the vector at the vertex
 //
 // `direction` is the vector along which the vertex moves. `gain` multiplies the displacement of a lung along x, y and z.
@@ -11,6 +12,10 @@
 // supine_gl_weights and supine_gl_normal_weights (supine/runtime.h). reference.w is the index of the lung and selects
 // its gains, so that one draw call draws all lungs. A vertex costs K + 6 multiplications and K + 2 additions, or 3 K + 3
 // and 3 K; its normal costs 3 Q multiplications and 3 Q additions.
+//
+// In a basis of clusters (supine_basis_info.cluster_count), a vertex costs 15 multiplications and 15 additions and has 20
+// bytes, however many modes there are. Its attributes (reference, scalars, cluster, lung) come from
+// supine_gl_pack_clusters, and the texture supine_frames from supine_gl_frames.
 
 #ifndef SUPINE_LUNGS
 #define SUPINE_LUNGS 2
@@ -105,6 +110,20 @@ vec3 supine_displace(vec4 reference, vec3 direction, vec4 c0, vec4 c1, vec4 c2, 
 // lung has weights of its own, supine_amount(supine_first(reference), x0, x1) and so on.
 vec3 supine_displace(vec4 reference, vec3 amounts) {
   return supine_place(reference, amounts, 1.0);
+}
+
+uniform highp sampler2D supine_frames; // a row for each cluster: b, the columns of A, Q_0 and Q_1
+
+// Displace a vertex of a basis of clusters.
+vec3 supine_displace(vec3 reference, vec2 scalars, uint cluster) {
+  int row = int(cluster);
+  vec3 b = texelFetch(supine_frames, ivec2(0, row), 0).xyz;
+  vec3 ax = texelFetch(supine_frames, ivec2(1, row), 0).xyz;
+  vec3 ay = texelFetch(supine_frames, ivec2(2, row), 0).xyz;
+  vec3 az = texelFetch(supine_frames, ivec2(3, row), 0).xyz;
+  vec3 q0 = texelFetch(supine_frames, ivec2(4, row), 0).xyz;
+  vec3 q1 = texelFetch(supine_frames, ivec2(5, row), 0).xyz;
+  return b + reference.x * ax + reference.y * ay + reference.z * az + scalars.x * q0 + scalars.y * q1;
 }
 
 // Compute the part of a vertex normal that one vertex attribute holds; the normal is the sum over all `part`s, before

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A page of another simulator's fields over gravity and volume, stored as modes and as clusters: positions and volumes are
-// those of the library, the two lungs open differently, the volume and the breath have their sliders, and a volume that
+// A page of another simulator's fields over gravity and volume, stored as modes and as clusters: positions, on the graphics
+// card and in the script, and volumes are those of the library; clusters stay clusters, so that the page is smaller; the two lungs open differently, the volume and the breath have their sliders, and a volume that
 // was not simulated is replaced by the nearest.
 import assert from 'node:assert/strict';
-import { readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, evaluateFor, openLungs, settled } from './browser.mjs';
 import { breathingFieldsBasis, deformed, floatsOf, folder, largestDistance, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02;
-const [html, points, inside, rows] = ['breathing.html', 'breathing.csv', 'breathing-inside.safetensors', 'breathing-moved.csv'].map((name) => join(folder, name));
-const states = [[[0, 1, 0], 300], [[0, -1, 0], 1200], [[1, 0, 0], 700], [[0, 0, -1], 1700], [[0.48, -0.6, 0.64], 950]];
+const [html, simplified, points, inside, rows] = ['breathing.html', 'breathing-simplified.html', 'breathing.csv', 'breathing-inside.safetensors', 'breathing-moved.csv'].map((name) => join(folder, name));
+const states = [[[0, 1, 0], 300], [[0, -1, 0], 1200], [[1, 0, 0], 700], [[0, 0, -1], 1700], [[0.48, -0.6, 0.64], 950], [[-0.8, 0.36, 0.48], 150], [[-0.6, -0.64, -0.48], 1450]];
+const sizes = {};
 for (const storage of ['modes', 'clusters']) {
   const basis = join(folder, `breathing-${storage}.safetensors`);
   breathingFieldsBasis(basis, 1200, storage);
@@ -27,6 +28,41 @@ for (const storage of ['modes', 'clusters']) {
   moments.forEach(({ at }, i) => { worst = Math.max(worst, largestDistance(at, truth[i].xyz)); });
   console.log(`${storage}: ${worst.toExponential(2)} mm off in ${states.length} states`);
   assert.ok(worst < TOLERANCE_MM, `${worst} mm`);
+  const scripted = await page.evaluate((all) => all.map(([g, ml]) => Array.from(window.supine.placesOf(window.supine.basis, window.supine.moment(g, ml)))), states);
+  scripted.forEach((at, i) => assert.ok(largestDistance(at, truth[i].xyz) < TOLERANCE_MM, `${states[i]}: the script errs`));
+
+  // A page of clusters has no coefficients of vertices. The vertices that have arrows move like the others.
+  assert.equal(await page.evaluate(() => window.supine.basis.coefficients === undefined), storage === 'clusters');
+  sizes[storage] = statSync(html).size;
+  const few = await page.evaluate(([g, ml]) => {
+    const { picture, moment } = window.supine;
+    const target = picture.buffer(16 * picture.fewCount, picture.gl.DYNAMIC_READ);
+    picture.capture(moment(g, ml), picture.fewInputs, target);
+    return { every: Math.floor(picture.basis.vertices / picture.fewCount), at: Array.from(picture.take(target, picture.fewCount)) };
+  }, states[4]);
+  assert.ok(few.every > 1 && few.at.length / 3 > 400);
+  assert.ok(largestDistance(few.at, moments[4].at.filter((_, i) => Math.floor(i / 3) % few.every === 0)) < 1e-4);
+
+  // The page knows the sums of squares of its vertices' displacements; those of a simplified page are of the whole surface.
+  const squaresIn = ({ page: shown }) => shown.evaluate(([g, ml]) => {
+    const { movedBetween, basis, moment } = window.supine;
+    movedBetween(basis, moment(g, ml), moment([0, 1, 0], 0));
+    return Array.from(basis.squares);
+  }, states[4]);
+  supine('export', basis, '--simplify', '700', '-o', simplified);
+  const part = await openLungs(simplified);
+  const [whole, stated] = [await squaresIn({ page }), await squaresIn(part)];
+  assert.ok(await part.page.evaluate(() => window.supine.basis.vertices < 800));
+  const most = Math.max(...whole);
+  assert.ok(most > 1 && whole.length === stated.length && whole.every((x, i) => Math.abs(x - stated[i]) < 1e-3 * most), 'sums of squares');
+  const [moved700] = await part.page.evaluate((all) => all.map(([g, ml]) => Array.from(window.supine.positions(g, ml))), [states[4]]);
+  for (let i = 0; i < moved700.length; i += 3) {
+    let nearest = Infinity; // a vertex that is kept stays where it was
+    for (let j = 0; j < moments[4].at.length; j += 3) nearest = Math.min(nearest, Math.hypot(...[0, 1, 2].map((axis) => moved700[i + axis] - moments[4].at[j + axis])));
+    assert.ok(nearest < 1e-3, `vertex ${i / 3} of the simplified page is ${nearest} mm off`);
+  }
+  assert.deepEqual(part.complaints, []);
+  await close(part.page);
   assert.ok(states.every((_, i) => i === 0 || largestDistance(truth[i].xyz, truth[0].xyz) > 2), 'the states are alike');
 
   // The lungs hold the volume that is asked, and share it as 'deform' does: the right lung lags behind.
@@ -49,8 +85,8 @@ for (const storage of ['modes', 'clusters']) {
   const sliders = await page.evaluate(() => { const { depthMin, depthMax, shared, tidal, expired } = window.supine.state; return { depthMin, depthMax, shared, tidal, expired }; });
   assert.ok(sliders.depthMin < 0 && sliders.depthMax > 1700 && sliders.tidal === 500, JSON.stringify(sliders));
   assert.ok(sliders.expired >= sliders.shared[0] && sliders.expired + sliders.tidal <= sliders.shared[1], JSON.stringify(sliders));
-  const most = await page.evaluate(() => window.supine.moment([0, -1, 0], 9000));
-  assert.equal(most.above, most.limited[1]);
+  const limited = await page.evaluate(() => window.supine.moment([0, -1, 0], 9000));
+  assert.equal(limited.above, limited.limited[1]);
   await page.evaluate(() => { location.hash = 'posture=prone&depth=900&room=0'; });
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'prone');
   await settled(page);
@@ -64,3 +100,4 @@ for (const storage of ['modes', 'clusters']) {
   await page.screenshot({ path: process.env.SCREENSHOT ?? join(folder, 'breathing.png') });
   await close(page);
 }
+assert.ok(sizes.clusters < sizes.modes - 20000, JSON.stringify(sizes));

@@ -227,6 +227,39 @@ TEST(test_page_of_vector_basis_coefficients_equal_basis) {
   free(page);
 }
 
+/* The page has the clusters as they are in the basis, and no coefficients. */
+TEST(test_page_of_clusters_equals_basis) {
+  char clusters[256];
+  fixture *f = fixture_create(40, 5, 3, 2, true, true, 5, 4711);
+  (void)snprintf(clusters, sizeof clusters, "%s/clusters", folder);
+  fixture_add_clusters(f, 7, 5.5, 16);
+  fixture_write(f, clusters);
+  assert_int_equal(EXPORT_RUN(text, clusters, "-o", out), 0);
+  char *page = read_page();
+  supine_basis *opened = NULL;
+  SUPINE_ARENA arena = {0};
+  export_order order = {0};
+  assert_int_equal(supine_basis_open(clusters, &opened, NULL), SUPINE_OK);
+  const supine_basis_info *s = supine_basis_get_info(opened);
+  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
+  int16_t *rows = take_rows(page, "clusters", s->vertex_count, 4);
+  for (size_t i = 0; i < s->vertex_count; ++i) {
+    const size_t v = order.vertex[i];
+    assert_int_equal(rows[4 * i], s->cluster_scalars[2 * v]);
+    assert_int_equal(rows[4 * i + 1], s->cluster_scalars[2 * v + 1]);
+    assert_int_equal(rows[4 * i + 2], s->cluster[v]);
+    assert_int_equal(rows[4 * i + 3], 0);
+  }
+  check_tensor(page, "cluster_vectors", f->cluster_vector,
+               (size_t)7 * 5 * SUPINE_CLUSTER_NUMBERS * sizeof(float));
+  assert_int_equal(number_of(page, "clusters"), 7);
+  assert_null(strstr(page, "tensor-coefficients"));
+  supine_basis_close(opened);
+  fixture_destroy(f);
+  free(rows);
+  free(page);
+}
+
 /* Return the number after `before` in the text that the command printed. */
 static double number_after(const char *printed, const char *before) {
   const char *at = strstr(printed, before);

@@ -215,8 +215,8 @@ TEST(test_volumes_clusters_equal_triangles) {
   drop(&o);
 }
 
-/* Distances and the shader's attributes follow from clusters as from stored coefficients. */
-TEST(test_other_readers_of_clusters_equal_stored_coefficients) {
+/* Distances follow from clusters as from stored coefficients. */
+TEST(test_distances_clusters_equal_stored_coefficients) {
   opened o = made(100, 2, CLUSTERS);
   opened stored = {.f = fixture_create(100, MODES, 2, 2, true, true, 1, 6011)};
   memcpy(stored.f->coefficient, o.f->coefficient, 300 * MODES * sizeof(float));
@@ -226,23 +226,84 @@ TEST(test_other_readers_of_clusters_equal_stored_coefficients) {
   uint64_t random = 71;
   const supine_pose pose = random_pose(&random);
   float distance[2][100];
-  float attributes[2][100 * (SUPINE_GL_VECTOR_FLOATS + 3 * MODES)];
   for (size_t b = 0; b < 2; ++b) {
     supine_compare *compare = NULL;
     assert_int_equal(supine_compare_create(bases[b], &compare, NULL), SUPINE_OK);
     assert_int_equal(supine_compare_distances(compare, &pose, NULL, distance[b]), SUPINE_OK);
-    assert_int_equal(supine_gl_pack(bases[b], 0, 100, attributes[b]), SUPINE_OK);
     supine_compare_destroy(compare);
     supine_basis_close(bases[b]);
   }
   for (size_t i = 0; i < 100; ++i) {
     assert_true(fabsf(distance[0][i] - distance[1][i]) <= 1e-4F);
   }
-  for (size_t i = 0; i < sizeof attributes[0] / sizeof(float); ++i) {
-    assert_true(fabsf(attributes[0][i] - attributes[1][i]) <= 1e-5F);
-  }
   drop(&o);
   drop(&stored);
+}
+
+/* The frames and attributes of the shader give the displacements of the fixture. A range has the
+ * attributes of its vertices. */
+TEST(test_gl_clusters_displace_like_fixture) {
+  opened o = made(100, 2, CLUSTERS);
+  supine_basis *basis = open_as(&o, SUPINE_SIMD_AUTO);
+  uint64_t random = 72;
+  const supine_pose pose = random_pose(&random);
+  supine_gl_clustered_vertex vertices[100];
+  float frames[CLUSTERS][6][4];
+  assert_int_equal(supine_gl_pack_clusters(basis, 0, 30, vertices), SUPINE_OK);
+  assert_int_equal(supine_gl_pack_clusters(basis, 30, 100, vertices + 30), SUPINE_OK);
+  assert_int_equal(supine_gl_frames(basis, &pose, frames[0][0]), SUPINE_OK);
+  double *displaced = displace(basis, &pose);
+  for (size_t i = 0; i < 100; ++i) {
+    const supine_gl_clustered_vertex *v = &vertices[i];
+    assert_int_equal(v->lung, o.f->lung[i]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      double x = (double)frames[v->cluster][0][axis];
+      for (size_t j = 0; j < 3; ++j) {
+        x += (double)frames[v->cluster][1 + j][axis] * (double)v->reference[j];
+      }
+      for (size_t j = 0; j < 2; ++j) {
+        x += (double)frames[v->cluster][4 + j][axis] * v->scalars[j];
+      }
+      assert_true(fabs(x - (double)o.f->vertex[3 * i + axis] - displaced[3 * i + axis]) < 1e-3);
+    }
+  }
+  free(displaced);
+  supine_basis_close(basis);
+  drop(&o);
+}
+
+/* Clusters are never expanded for the shader, and modes have no clusters. */
+TEST(test_gl_other_kind_of_basis_unsupported) {
+  opened o = made(100, 2, CLUSTERS);
+  opened modes = {.f = fixture_create(20, MODES, 2, 2, true, true, 1, 6011)};
+  modes.bytes = fixture_bytes(modes.f, &modes.size);
+  supine_basis *clusters = open_as(&o, SUPINE_SIMD_AUTO);
+  supine_basis *basis = open_as(&modes, SUPINE_SIMD_AUTO);
+  const supine_pose pose = {.gains = {{1, 1, 1}}};
+  supine_gl_clustered_vertex vertex;
+  float numbers[2][64];
+  assert_int_equal(supine_gl_pack(clusters, 0, 1, numbers[0]), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_weights(clusters, &pose, numbers[0], numbers[1]),
+                   SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_pack_clusters(basis, 0, 1, &vertex), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_frames(basis, &pose, numbers[0]), SUPINE_ERROR_UNSUPPORTED);
+  supine_basis_close(basis);
+  supine_basis_close(clusters);
+  drop(&modes);
+  drop(&o);
+}
+
+/* A pose of another basis, or with a number that is not finite, has no frames. */
+TEST(test_gl_frames_wrong_pose_refused) {
+  opened o = made(100, 2, CLUSTERS);
+  supine_basis *basis = open_as(&o, SUPINE_SIMD_AUTO);
+  float frames[CLUSTERS * SUPINE_GL_FRAME_FLOATS];
+  supine_pose pose = {.basis = supine_basis_get_info(basis)->identity + 1};
+  assert_int_equal(supine_gl_frames(basis, &pose, frames), SUPINE_ERROR_ARGUMENT);
+  pose = (supine_pose){.weights = {NAN}};
+  assert_int_equal(supine_gl_frames(basis, &pose, frames), SUPINE_ERROR_ARGUMENT);
+  supine_basis_close(basis);
+  drop(&o);
 }
 
 /* Open a file that a changed fixture writes, and assert that it is refused for this reason. */

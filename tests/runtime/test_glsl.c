@@ -27,6 +27,7 @@ enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
   F(PFNGLBINDBUFFERBASEPROC, BindBufferBase)                                                       \
   F(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                                                     \
   F(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                                                   \
+  F(PFNGLBINDTEXTUREPROC, BindTexture)                                                             \
   F(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                                                     \
   F(PFNGLBUFFERDATAPROC, BufferData)                                                               \
   F(PFNGLCOMPILESHADERPROC, CompileShader)                                                         \
@@ -41,6 +42,7 @@ enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
   F(PFNGLGENBUFFERSPROC, GenBuffers)                                                               \
   F(PFNGLGENFRAMEBUFFERSPROC, GenFramebuffers)                                                     \
   F(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                                                   \
+  F(PFNGLGENTEXTURESPROC, GenTextures)                                                             \
   F(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                                                     \
   F(PFNGLGETERRORPROC, GetError)                                                                   \
   F(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                                                 \
@@ -53,7 +55,10 @@ enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
   F(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)                                                       \
   F(PFNGLRENDERBUFFERSTORAGEPROC, RenderbufferStorage)                                             \
   F(PFNGLSHADERSOURCEPROC, ShaderSource)                                                           \
+  F(PFNGLTEXIMAGE2DPROC, TexImage2D)                                                               \
+  F(PFNGLTEXPARAMETERIPROC, TexParameteri)                                                         \
   F(PFNGLTRANSFORMFEEDBACKVARYINGSPROC, TransformFeedbackVaryings)                                 \
+  F(PFNGLUNIFORM1IPROC, Uniform1i)                                                                 \
   F(PFNGLUNIFORM3FVPROC, Uniform3fv)                                                               \
   F(PFNGLUNIFORM4FVPROC, Uniform4fv)                                                               \
   F(PFNGLUSEPROGRAMPROC, UseProgram)                                                               \
@@ -119,6 +124,32 @@ static GLuint make_shader(const gl_api *gl, GLenum kind, const char *version, co
   return shader;
 }
 
+/* Link an OpenGL program with the vertex shader `vertex`, whose attributes have the names [16] by
+ * location. OpenGL has at least 16. An empty name is not used. */
+static GLuint link_program(const gl_api *gl, const char *version, const char *defines,
+                           const char *library, const char *vertex, const char *const *names) {
+  static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
+  static const char *const varyings[] = {"position", "normal"};
+  const GLuint program = gl->CreateProgram();
+  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
+  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
+  for (GLuint i = 0; i < NORMALS_AT + WORDS; ++i) {
+    if (names[i][0] != '\0') {
+      gl->BindAttribLocation(program, i, names[i]);
+    }
+  }
+  gl->TransformFeedbackVaryings(program, 2, varyings, GL_INTERLEAVED_ATTRIBS);
+  gl->LinkProgram(program);
+  GLint good = 0;
+  gl->GetProgramiv(program, GL_LINK_STATUS, &good);
+  if (!good) {
+    char log[2048] = "";
+    gl->GetProgramInfoLog(program, sizeof log, NULL, log);
+    fail_msg("%s", log);
+  }
+  return program;
+}
+
 /* Link an OpenGL program that displaces vertices by coefficients in `vectors` vec4s along the
  * vertex's direction or, if `axes` is 3, along each axis, by the weights of all lungs or of each.
  */
@@ -134,14 +165,10 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
        "vec3(supine_amount(c0, c1, c2), supine_amount(y0, y1, y2), supine_amount(z0, z1, z2))",
        "vec3(supine_amount(c0, c1, c2, c3), supine_amount(y0, y1, y2, y3),\n"
        "     supine_amount(z0, z1, z2, z3))"}};
-  static const char fragment[] = "out vec4 colour; void main() { colour = vec4(1.0); }\n";
-  /* Attributes by location. OpenGL has at least 16. */
   static const char *const scalar[] = {"rest", "c0", "c1", "c2", "c3", "direction", "",   "",
                                        "",     "",   "",   "",   "",   "n0",        "n1", "n2"};
   static const char *const vector[] = {"rest", "c0", "c1", "c2", "c3", "y0", "y1", "y2",
                                        "y3",   "z0", "z1", "z2", "z3", "n0", "n1", "n2"};
-  const char *const *names = axes == 3 ? vector : scalar;
-  static const char *const varyings[] = {"position", "normal"};
   char vertex[2048];
   char defines[256];
   (void)snprintf(defines, sizeof defines,
@@ -163,24 +190,29 @@ static GLuint make_program(const gl_api *gl, const char *version, const char *li
                              "in vec4 z0; in vec4 z1; in vec4 z2; in vec4 z3;"
                            : "in vec3 direction;",
                  by_lung ? own : arguments[axes / 2][vectors - 1]);
-  const GLuint program = gl->CreateProgram();
-  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, defines, library, vertex));
-  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version, "", "", fragment));
-  for (GLuint i = 0; i < NORMALS_AT + WORDS; ++i) {
-    if (names[i][0] != '\0') {
-      gl->BindAttribLocation(program, i, names[i]);
-    }
-  }
-  gl->TransformFeedbackVaryings(program, 2, varyings, GL_INTERLEAVED_ATTRIBS);
-  gl->LinkProgram(program);
-  GLint good = 0;
-  gl->GetProgramiv(program, GL_LINK_STATUS, &good);
-  if (!good) {
-    char log[2048] = "";
-    gl->GetProgramInfoLog(program, sizeof log, NULL, log);
-    fail_msg("%s", log);
-  }
-  return program;
+  return link_program(gl, version, defines, library, vertex, axes == 3 ? vector : scalar);
+}
+
+/* Link an OpenGL program that displaces the vertices of a basis of clusters. */
+static GLuint make_clustered_program(const gl_api *gl, const char *version, const char *library) {
+  static const char *const names[] = {"rest", "scalars", "cluster", "lung", "", "",   "",   "",
+                                      "",     "",        "",        "",     "", "n0", "n1", "n2"};
+  static const char vertex[] =
+      "in vec3 rest; in vec2 scalars; in uint cluster; in uint lung;\n"
+      "in uvec3 n0; in uvec3 n1; in uvec3 n2;\n"
+      "out vec3 position;\n"
+      "out vec3 normal;\n"
+      "void main() {\n"
+      "  vec4 at = vec4(rest, float(lung));\n"
+      "  position = supine_displace(rest, scalars, cluster);\n"
+      "  normal = normalize(supine_normal(at, 0, n0) + supine_normal(at, 1, n1) +\n"
+      "                     supine_normal(at, 2, n2));\n"
+      "  gl_Position = vec4(position, 1.0);\n"
+      "}\n";
+  char defines[128];
+  (void)snprintf(defines, sizeof defines, "#define SUPINE_LUNGS %d\n#define SUPINE_WORDS %d\n",
+                 LUNGS, WORDS);
+  return link_program(gl, version, defines, library, vertex, names);
 }
 
 /* Create a framebuffer to draw into, as a context without a surface has none. */
@@ -198,26 +230,22 @@ static void make_framebuffer(const gl_api *gl) {
 /* Inputs of the vertex shader. */
 typedef struct model {
   size_t modes;
-  size_t axes;        /* 3 for a basis with three coefficients for each mode, otherwise 1 */
-  size_t head;        /* floats of a vertex before its coefficients */
-  float *attributes;  /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
-  uint32_t *words;    /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
+  size_t axes;       /* 3 for a basis with three coefficients for each mode, otherwise 1 */
+  size_t head;       /* floats of a vertex before its coefficients */
+  float *attributes; /* [VERTICES, head + axes * modes] vertex attributes from supine_gl_pack */
+  uint32_t *words;   /* [VERTICES, WORDS, 3] packed normals from supine_gl_pack_normals */
+  size_t clusters;   /* 0, or number of clusters; then without attributes, weights and gains */
+  supine_gl_clustered_vertex *vertices; /* [VERTICES] from supine_gl_pack_clusters */
+  float *frames;      /* [clusters, SUPINE_GL_FRAME_FLOATS] from supine_gl_frames */
   size_t weight_rows; /* LUNGS if each lung has weights of its own, otherwise 1 */
   float weights[LUNGS * SUPINE_GL_MODES];
   float gains[3 * LUNGS];
   float normal_weights[LUNGS * WORDS * 3];
 } model;
 
-/* Create the vertex arrays of the model. */
-static void load_model(const gl_api *gl, const model *m) {
-  const size_t floats = m->head + m->axes * m->modes;
-  const GLsizei stride = (GLsizei)(floats * sizeof(float));
-  GLuint array = 0;
-  GLuint buffers[2] = {0, 0};
-  gl->GenVertexArrays(1, &array);
-  gl->BindVertexArray(array);
-  gl->GenBuffers(2, buffers);
-  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+/* Create the vertex arrays of modes. */
+static void load_modes(const gl_api *gl, const model *m) {
+  const GLsizei stride = (GLsizei)((m->head + m->axes * m->modes) * sizeof(float));
   gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, m->attributes, GL_STATIC_DRAW);
   gl->EnableVertexAttribArray(0);
   gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, stride, NULL);
@@ -234,6 +262,41 @@ static void load_model(const gl_api *gl, const model *m) {
       gl->VertexAttribPointer(location, m->modes - k < 4 ? (GLint)(m->modes - k) : 4, GL_FLOAT,
                               GL_FALSE, stride, (const void *)offset);
     }
+  }
+}
+
+/* Create the vertex arrays and the texture of clusters. */
+static void load_clusters(const gl_api *gl, const model *m) {
+  const GLsizei stride = (GLsizei)sizeof *m->vertices;
+  GLuint texture = 0;
+  gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)VERTICES * stride, m->vertices, GL_STATIC_DRAW);
+  for (GLuint location = 0; location < 4; ++location) {
+    gl->EnableVertexAttribArray(location);
+  }
+  gl->VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, stride, NULL);
+  gl->VertexAttribPointer(1, 2, GL_SHORT, GL_FALSE, stride, (const void *)12);
+  gl->VertexAttribIPointer(2, 1, GL_UNSIGNED_SHORT, stride, (const void *)16);
+  gl->VertexAttribIPointer(3, 1, GL_UNSIGNED_SHORT, stride, (const void *)18);
+  gl->GenTextures(1, &texture);
+  gl->BindTexture(GL_TEXTURE_2D, texture);
+  gl->TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, SUPINE_GL_FRAME_FLOATS / 4, (GLsizei)m->clusters, 0,
+                 GL_RGBA, GL_FLOAT, m->frames);
+  gl->TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  gl->TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+}
+
+/* Create the vertex arrays of the model. */
+static void load_model(const gl_api *gl, const model *m) {
+  GLuint array = 0;
+  GLuint buffers[2] = {0, 0};
+  gl->GenVertexArrays(1, &array);
+  gl->BindVertexArray(array);
+  gl->GenBuffers(2, buffers);
+  gl->BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+  if (m->clusters > 0) {
+    load_clusters(gl, m);
+  } else {
+    load_modes(gl, m);
   }
   gl->BindBuffer(GL_ARRAY_BUFFER, buffers[1]);
   gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(VERTICES * WORDS * 3 * sizeof *m->words), m->words,
@@ -257,9 +320,13 @@ static void run_shader(const gl_api *gl, GLuint program, const model *m, float *
   gl->BufferData(GL_TRANSFORM_FEEDBACK_BUFFER, output, NULL, GL_DYNAMIC_READ);
   gl->BindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, buffer);
   gl->UseProgram(program);
-  gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"),
-                 vectors * (GLsizei)m->weight_rows, m->weights);
-  gl->Uniform3fv(gl->GetUniformLocation(program, "supine_gains"), LUNGS, m->gains);
+  if (m->clusters == 0) {
+    gl->Uniform4fv(gl->GetUniformLocation(program, "supine_weights"),
+                   vectors * (GLsizei)m->weight_rows, m->weights);
+    gl->Uniform3fv(gl->GetUniformLocation(program, "supine_gains"), LUNGS, m->gains);
+  } else {
+    gl->Uniform1i(gl->GetUniformLocation(program, "supine_frames"), 0);
+  }
   gl->Uniform3fv(gl->GetUniformLocation(program, "supine_normal_weights"), LUNGS * WORDS,
                  m->normal_weights);
   gl->Enable(GL_RASTERIZER_DISCARD);
@@ -373,6 +440,57 @@ static void check_simulated(const gl_api *gl, const char *version, const char *l
   fixture_destroy(f);
 }
 
+/* Assert that a basis of clusters has the positions and normals of the C library. It has more modes
+ * than the shader can hold without clusters. */
+static void check_clusters(const gl_api *gl, const char *version, const char *library) {
+  enum { CLUSTERS = 300 };
+  model m = {.clusters = CLUSTERS};
+  const GLuint program = make_clustered_program(gl, version, library);
+  fixture *f = fixture_create(VERTICES, SUPINE_GL_MODES + 1, 3, LUNGS, true, false, 9, 21);
+  fixture_add_clusters(f, CLUSTERS, 9, 22);
+  fixture_add_normals(f, NORMALS, 5);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_get_info(basis)->cluster_count, CLUSTERS);
+  m.vertices = fixture_allocate(VERTICES, sizeof *m.vertices);
+  m.frames = fixture_allocate((size_t)CLUSTERS * SUPINE_GL_FRAME_FLOATS, sizeof *m.frames);
+  m.words = fixture_allocate((size_t)VERTICES * WORDS * 3, sizeof *m.words);
+  float *gpu = fixture_allocate(6 * VERTICES, sizeof *gpu);
+  float *cpu = fixture_allocate(6 * VERTICES, sizeof *cpu);
+  const float *normals = cpu + 3 * VERTICES;
+  const double gravity[3] = {0.6, -0.3, 0.2};
+  const double scales[LUNGS] = {1.7, -0.9};
+  double weights[SUPINE_MODES_MAX];
+  assert_int_equal(supine_basis_weights(basis, gravity, weights), SUPINE_OK);
+  const supine_pose *pose = POSED(basis, weights, scales);
+  assert_int_equal(supine_gl_pack_clusters(basis, 0, VERTICES, m.vertices), SUPINE_OK);
+  assert_int_equal(supine_gl_frames(basis, pose, m.frames), SUPINE_OK);
+  assert_int_equal(supine_gl_pack_normals(basis, 0, VERTICES, m.words), SUPINE_OK);
+  assert_int_equal(supine_gl_normal_weights(basis, pose, m.normal_weights), SUPINE_OK);
+  run_shader(gl, program, &m, gpu);
+  assert_int_equal(supine_deform_lit(basis, pose, cpu, cpu + 3 * VERTICES), SUPINE_OK);
+  const double bound = 2 * supine_basis_error(basis, pose);
+  double moved = 0;
+  assert_true(bound < 2e-3);
+  for (size_t i = 0; i < 3 * (size_t)VERTICES; ++i) {
+    const float *vertex = gpu + 6 * (i / 3) + i % 3;
+    assert_true(fabs((double)vertex[0] - (double)cpu[i]) <= bound);
+    assert_true(fabs((double)vertex[3] - (double)normals[i]) <= normal_rounding);
+    moved = fmax(moved, fabs((double)vertex[0] - (double)f->vertex[i]));
+  }
+  assert_true(moved > 1);
+  free(m.vertices);
+  free(m.frames);
+  free(m.words);
+  free(gpu);
+  free(cpu);
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
 static void check_glsl(EGLenum api, const char *version) {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
@@ -392,6 +510,7 @@ static void check_glsl(EGLenum api, const char *version) {
     check_modes(&gl, version, (const char *)library, modes[i], true);
   }
   check_simulated(&gl, version, (const char *)library);
+  check_clusters(&gl, version, (const char *)library);
   free(library);
   (void)eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   (void)eglDestroyContext(display, context);

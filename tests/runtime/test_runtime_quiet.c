@@ -145,6 +145,8 @@ static void use_all(const supine_basis *basis, float *xyz) {
   (void)supine_deform_lit(basis, POSED(basis, weights, scales), xyz, xyz + 3 * n);
   (void)supine_gl_pack(basis, 0, n, xyz);
   (void)supine_gl_weights(basis, POSED(basis, weights, scales), xyz, xyz + n);
+  (void)supine_gl_pack_clusters(basis, 0, n, NULL); /* writes nothing, as there are no clusters */
+  (void)supine_gl_frames(basis, POSED(basis, weights, scales), NULL);
   (void)supine_gl_pack_normals(basis, 0, n, (uint32_t *)(void *)xyz);
   (void)supine_gl_normal_weights(basis, POSED(basis, weights, scales), xyz);
   (void)supine_basis_metadata(basis, "kind");

@@ -33,7 +33,10 @@ typedef struct work {
   supine_state state;
   supine_pose pose, other;
   supine_error error;
-  float xyz[VERTICES * (SUPINE_GL_FLOATS + 9)], second[3 * VERTICES], distance[VERTICES];
+  float xyz[VERTICES * (SUPINE_GL_FLOATS + SUPINE_GL_MODES)], second[3 * VERTICES];
+  float distance[VERTICES];
+  supine_gl_clustered_vertex clustered[VERTICES];
+  float frames[SUPINE_CLUSTERS_MAX * SUPINE_GL_FRAME_FLOATS];
   double numbers[SUPINE_MODES_MAX];
   supine_distance_statistics statistics;
   double energy[3 * SUPINE_MODES_MAX * SUPINE_MODES_MAX];
@@ -83,10 +86,12 @@ static void use_positions(work *w) {
   expect_ok(supine_displace_range(basis, &w->pose, 0, n, second));
   supine_step(n, second, xyz);
   supine_normals(basis, xyz, second);
-  /* These need normals in the file, which only one of the two bases has. */
+  /* These need normals, modes or clusters in the file, which not every basis has. */
   (void)supine_deform_lit(basis, &w->pose, xyz, second);
   (void)supine_gl_pack(basis, 0, n, xyz);
   (void)supine_gl_weights(basis, &w->pose, xyz, xyz + n);
+  (void)supine_gl_pack_clusters(basis, 0, n, w->clustered);
+  (void)supine_gl_frames(basis, &w->pose, w->frames);
   (void)supine_gl_pack_normals(basis, 0, n, (uint32_t *)(void *)xyz);
   (void)supine_gl_normal_weights(basis, &w->pose, xyz);
 }
@@ -184,6 +189,13 @@ TEST(test_all_functions_stated_stack_suffices) {
 
 TEST(test_normals_stated_stack_suffices) {
   fixture *f = fixture_create(VERTICES, 16, 6, 2, false, true, 5, 9);
+  fixture_add_normals(f, 6, 4);
+  expect_small_stack(f, use_normals);
+}
+
+TEST(test_clusters_stated_stack_suffices) {
+  fixture *f = fixture_create(VERTICES, 16, 6, 2, true, true, 5, 9);
+  fixture_add_clusters(f, 9, 5, 4);
   fixture_add_normals(f, 6, 4);
   expect_small_stack(f, use_normals);
 }

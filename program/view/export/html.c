@@ -24,13 +24,12 @@ typedef struct page {
   const supine_basis_info *info;   /* of `basis` */
   const supine_basis_info *inside; /* of the structures inside the lungs; NULL if there are none */
   const export_page *shown;
-  const float *coefficients; /* of `basis`, also if it stores clusters */
-  double middle[3];          /* origin of stored positions, mm: centre of the bounding box */
-  double position_step;      /* quantisation step of positions, mm */
-  double coefficient_step;   /* quantisation step of the surface's displacements by modes, mm */
-  double inside_step;        /* the same for structures inside the lungs, mm */
-  export_order order;        /* order of stored vertices and triangles of the surface */
-  json_t *tensors; /* list of objects {name, base64} for the tag {{tensors}} of page.html */
+  double middle[3];        /* origin of stored positions, mm: centre of the bounding box */
+  double position_step;    /* quantisation step of positions, mm */
+  double coefficient_step; /* quantisation step of the surface's displacements by modes, mm */
+  double inside_step;      /* the same for structures inside the lungs, mm */
+  export_order order;      /* order of stored vertices and triangles of the surface */
+  json_t *tensors;         /* list of objects {name, base64} for the tag {{tensors}} of page.html */
   supine_arena arena;
 } page;
 
@@ -80,19 +79,24 @@ static size_t axes_of(const supine_basis_info *info) {
   return info->vector ? 3 : 1;
 }
 
-/* Return the coefficients of the basis or of the structures inside the lungs. */
-static const float *coefficients_of(const page *p, const supine_basis_info *info) {
-  return info == p->info ? p->coefficients : info->coefficients;
-}
-
 static void coefficient_row(const page *p, const supine_basis_info *info, size_t vertex,
                             size_t axis, int16_t *row) {
   const size_t k = info->mode_count;
-  const float *from = coefficients_of(p, info) + (vertex * axes_of(info) + axis) * k;
+  const float *from = info->coefficients + (vertex * axes_of(info) + axis) * k;
   const double step = info == p->info ? p->coefficient_step : p->inside_step;
   for (size_t i = 0; i < k; ++i) {
     row[i] = quantise((double)from[i] * reach_of(info, vertex), step);
   }
+}
+
+/* Write the scalars and the cluster of a vertex, which fit 16 bits as they are. */
+static void cluster_row(const page *p, const supine_basis_info *info, size_t vertex, size_t axis,
+                        int16_t *row) {
+  (void)p;
+  (void)axis;
+  row[0] = info->cluster_scalars[2 * vertex];
+  row[1] = info->cluster_scalars[2 * vertex + 1];
+  row[2] = (int16_t)info->cluster[vertex];
 }
 
 typedef void fill_row(const page *p, const supine_basis_info *info, size_t vertex, size_t axis,
@@ -118,6 +122,14 @@ static supine_status add_rows(page *p, const char *name, const supine_basis_info
   return add_tensor(p, name, packed, size);
 }
 
+/* Add what moves vertices in clusters: a row for each vertex, and the vectors of each cluster. */
+static supine_status add_clusters(page *p) {
+  const supine_basis_info *info = p->info;
+  const size_t numbers = info->cluster_count * info->mode_count * SUPINE_CLUSTER_NUMBERS;
+  SUPINE_TRY(add_rows(p, "clusters", info, 1, 3, cluster_row));
+  return add_tensor(p, "cluster_vectors", info->cluster_vectors, numbers * sizeof(float));
+}
+
 static supine_status add_corners(page *p, const char *name, const uint32_t *corners, size_t count,
                                  size_t vertices) {
   size_t size = 0;
@@ -127,12 +139,11 @@ static supine_status add_corners(page *p, const char *name, const uint32_t *corn
 }
 
 /* Return the largest displacement of a vertex along an axis by one mode, mm. */
-static double largest_coefficient(const page *p, const supine_basis_info *info) {
-  const float *coefficients = coefficients_of(p, info);
+static double largest_coefficient(const supine_basis_info *info) {
   const size_t columns = axes_of(info) * info->mode_count;
   double largest = 0;
   for (size_t i = 0; i < info->vertex_count * columns; ++i) {
-    largest = fmax(largest, fabs((double)coefficients[i]) * reach_of(info, i / columns));
+    largest = fmax(largest, fabs((double)info->coefficients[i]) * reach_of(info, i / columns));
   }
   return largest;
 }
@@ -154,8 +165,14 @@ static void find_steps(page *p) {
     p->middle[axis] = (low[axis] + high[axis]) / 2;
     p->position_step = fmax(p->position_step, (high[axis] - low[axis]) / (2 * STORED_MAX));
   }
-  p->coefficient_step = fmax(least, largest_coefficient(p, p->info) / STORED_MAX);
-  p->inside_step = inside == NULL ? 1 : fmax(least, largest_coefficient(p, inside) / STORED_MAX);
+  p->coefficient_step = 1;
+  p->inside_step = 1;
+  if (p->info->cluster_count == 0) {
+    p->coefficient_step = fmax(least, largest_coefficient(p->info) / STORED_MAX);
+  }
+  if (inside != NULL) {
+    p->inside_step = fmax(least, largest_coefficient(inside) / STORED_MAX);
+  }
 }
 
 /* Add the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
@@ -185,7 +202,7 @@ static supine_status add_squares(page *p) {
   if (squares == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
-  supine_export_squares(info, p->coefficients, squares);
+  supine_export_squares(p->basis, squares);
   return add_tensor(p, "squares", squares, count * sizeof *squares);
 }
 
@@ -281,18 +298,16 @@ static json_t *describe_froms(const page *p) {
 static json_t *describe(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, s:o, "
-      "s:o, "
-      "s:o, "
-      "s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
+      "s:o, s:o, s:o, s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
       "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
       (json_int_t)info->vertex_count, "triangles",
       (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
-      (json_int_t)info->mode_count, "band", (json_int_t)info->band, "order",
-      (json_int_t)info->order, "vector", (int)info->vector, "lungBegin",
-      begins(info, p->order.lung_begin), "cornerBegin", begins(info, p->order.corner_begin),
-      "hasResting", (int)info->has_rest, "colours", colours(), "breathVolume", p->shown->breath,
-      "metadata", supine_options_json_metadata(p->basis), "title",
+      (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count, "band",
+      (json_int_t)info->band, "order", (json_int_t)info->order, "vector", (int)info->vector,
+      "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
+      begins(info, p->order.corner_begin), "hasResting", (int)info->has_rest, "colours", colours(),
+      "breathVolume", p->shown->breath, "metadata", supine_options_json_metadata(p->basis), "title",
       supine_options_json_text(p->shown->title), "middle",
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
       p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
@@ -309,7 +324,11 @@ static supine_status add_tensors(page *p) {
   if (!info->vector) {
     SUPINE_TRY(add_rows(p, "direction", info, 1, 4, direction_row));
   }
-  SUPINE_TRY(add_rows(p, "coefficients", info, axes_of(info), info->mode_count, coefficient_row));
+  if (info->cluster_count > 0) {
+    SUPINE_TRY(add_clusters(p));
+  } else {
+    SUPINE_TRY(add_rows(p, "coefficients", info, axes_of(info), info->mode_count, coefficient_row));
+  }
   SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],
                          p->order.vertex_count));
   SUPINE_TRY(add_doubles(p));
@@ -325,19 +344,6 @@ static supine_status add_tensors(page *p) {
                          inside->vertex_count));
   return add_tensor(p, "inside-parts", p->shown->names->part,
                     inside->vertex_count * sizeof *p->shown->names->part);
-}
-
-/* Find the coefficients of the basis: compute those of clusters. */
-static supine_status find_coefficients(page *p, supine_error *error) {
-  const size_t n = p->info->vertex_count;
-  p->coefficients = p->info->coefficients;
-  if (p->info->cluster_count == 0) {
-    return SUPINE_OK;
-  }
-  float *computed = supine_arena_take(&p->arena, 3 * n * p->info->mode_count, sizeof *computed);
-  SUPINE_TRY(supine_arena_check(&p->arena, error, "%zu vertices", n));
-  p->coefficients = computed;
-  return supine_basis_coefficients(p->basis, 0, n, computed);
 }
 
 static void free_page(page *p) {
@@ -360,7 +366,6 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
       "a page shows up to %d modes, not %zu: precompute the basis with --modes %d, or export .glb",
       MODES_MAX, p.info->mode_count, MODES_MAX);
   SUPINE_TRY(supine_export_pack_begin(error));
-  SUPINE_TRY(find_coefficients(&p, error));
   SUPINE_TRY(supine_export_order_make(p.info, true, shown->simplify, &p.arena, &p.order, error));
   *written = (export_written){.vertices = p.order.vertex_count};
   if (shown->simplify > 0) {

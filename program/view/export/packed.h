@@ -57,9 +57,7 @@ supine_status supine_export_order_error(const supine_basis_info *info, const exp
 /** Compute, for each lung and axis, the sums over the basis' vertices of the products of their
  * displacements by two modes at weight and gain 1, divided by the number of all vertices, mm^2. The
  * page of a simplified surface needs them to state the same expected errors as the basis.
- * @param coefficients  those of the basis, also if it stores clusters
- * @param squares       [lungs, 3, modes, modes], output */
-void supine_export_squares(const supine_basis_info *info, const float *coefficients,
-                           double *squares);
+ * @param squares  [lungs, 3, modes, modes], output */
+void supine_export_squares(const supine_basis *basis, double *squares);
 
 #endif

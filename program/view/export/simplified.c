@@ -49,29 +49,35 @@ supine_status supine_export_order_error(const supine_basis_info *info, const exp
   return SUPINE_OK;
 }
 
-/* Compute the displacement of a vertex along an axis by each mode at weight and gain 1, mm. */
-static void find_row(const supine_basis_info *info, const float *coefficients, size_t vertex,
-                     size_t axis, double *row) {
+/* Compute the displacement of a vertex by each mode at weight and gain 1, [3, modes] mm. */
+static void find_rows(const supine_basis *basis, size_t vertex, double *rows) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t k = info->mode_count;
-  for (size_t i = 0; i < k; ++i) {
-    if (info->vector) {
-      row[i] = (double)coefficients[(3 * vertex + axis) * k + i];
-    } else {
-      row[i] = (double)coefficients[vertex * k + i] * (double)info->direction[3 * vertex + axis];
+  if (info->vector) {
+    float vectors[3 * SUPINE_MODES_MAX];
+    (void)supine_basis_coefficients(basis, vertex, vertex + 1, vectors); /* takes every vertex */
+    for (size_t i = 0; i < 3 * k; ++i) {
+      rows[i] = (double)vectors[i];
     }
+    return;
+  }
+  for (size_t i = 0; i < 3 * k; ++i) {
+    rows[i] = (double)info->coefficients[vertex * k + i % k] *
+              (double)info->direction[3 * vertex + i / k];
   }
 }
 
-void supine_export_squares(const supine_basis_info *info, const float *coefficients,
-                           double *squares) {
+void supine_export_squares(const supine_basis *basis, double *squares) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t k = info->mode_count;
-  double row[SUPINE_MODES_MAX];
+  double rows[3 * SUPINE_MODES_MAX];
   memset(squares, 0, info->lung_count * 3 * k * k * sizeof *squares);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     for (size_t v = info->lung_begin[lung]; v < info->lung_begin[lung + 1]; ++v) {
+      find_rows(basis, v, rows);
       for (size_t axis = 0; axis < 3; ++axis) {
+        const double *row = rows + axis * k;
         double *sums = squares + (3 * lung + axis) * k * k;
-        find_row(info, coefficients, v, axis, row);
         for (size_t i = 0; i < k * k; ++i) {
           sums[i] += row[i / k] * row[i % k] / (double)info->vertex_count;
         }

@@ -70,7 +70,8 @@ function readBasis() {
   basis.direction = Float32Array.from({ length: directions.length / 4 * 3 }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
   basis.fields = basis.metadata.route === 'fields'; // made from another simulator's fields
   basis.breathes = !basis.fields || basis.order > 0; // fields of gravity alone have no volumes and no breaths
-  basis.coefficients = takeRows('coefficients', (basis.vector ? 3 : 1) * n, basis.modes, basis.unit);
+  if (basis.clusters > 0) takeClusters(basis);
+  else basis.coefficients = takeRows('coefficients', (basis.vector ? 3 : 1) * n, basis.modes, basis.unit);
   basis.corners = takeTriangles('triangles', basis.triangles);
   basis.mixes = takeTensor('modes', Float64Array);
   basis.linear = takeTensor('volume_linear', Float64Array);
@@ -91,6 +92,48 @@ function readBasis() {
   basis.torso = { ...box, centre: low.map((x, i) => (x + high[i]) / 2), half: low.map((x, i) => (high[i] - x) / 2) };
   if (basis.inside) takeInside(basis);
   return basis;
+}
+
+// Numbers of a cluster for each mode, and of its frame, like runtime/cluster_row.h and runtime/clusters.h.
+const [CLUSTER_NUMBERS, CLUSTER_SLOPE, CLUSTER_PATTERN, FRAME] = [18, 3, 12, 24];
+
+/** Read the clusters of vertices that move alike: for each vertex its two scalars a and its cluster, four integers; for
+ * each cluster, [clusters, modes, 18], a vector m, the rows of a matrix B, and two vectors P. A vertex at p moves by
+ * m + B p + a_0 P_0 + a_1 P_1 in each mode. */
+function takeClusters(basis) {
+  basis.clustered = takeCounts('clusters', basis.vertices, 3);
+  basis.clusterVectors = takeTensor('cluster_vectors', Float32Array);
+  basis.clusterLung = new Uint8Array(basis.clusters);
+  for (let v = 0; v < basis.vertices; ++v) basis.clusterLung[basis.clustered[4 * v + 2]] = lungOf(basis, v);
+}
+
+const framesKept = new WeakMap(); // result of framesOf for each moment, which never changes
+
+/** Return the frames of all clusters in a state of the lungs, [clusters, 24]: b, the columns of A, Q_0 and Q_1, four
+ * numbers each. A vertex at p with the scalars a moves to b + A p + a_0 Q_0 + a_1 Q_1. */
+function framesOf(basis, moment) {
+  if (!framesKept.has(moment)) {
+    const frames = new Float32Array(FRAME * basis.clusters);
+    const weights = basis.lungNames.map((_, lung) => weightsOf(basis, moment, lung));
+    basis.clusterLung.forEach((lung, c) => frames.set(frameOf(basis, c, weights[lung], moment.gains.slice(3 * lung, 3 * lung + 3)), FRAME * c));
+    framesKept.set(moment, frames);
+  }
+  return framesKept.get(moment);
+}
+
+/** Return the frame of a cluster for the weights of the modes and the gains of its lung. */
+function frameOf({ modes, clusterVectors }, cluster, weights, gains) {
+  const sum = new Float64Array(CLUSTER_NUMBERS);
+  for (let k = 0, at = cluster * modes * CLUSTER_NUMBERS; k < modes; ++k, at += CLUSTER_NUMBERS) {
+    for (let i = 0; i < CLUSTER_NUMBERS; ++i) sum[i] += weights[k] * clusterVectors[at + i];
+  }
+  const frame = new Float64Array(FRAME);
+  for (let axis = 0; axis < 3; ++axis) {
+    frame[axis] = gains[axis] * sum[axis];
+    for (let column = 0; column < 3; ++column) frame[4 + 4 * column + axis] = Number(axis === column) + gains[axis] * sum[CLUSTER_SLOPE + 3 * axis + column];
+    for (let s = 0; s < 2; ++s) frame[16 + 4 * s + axis] = gains[axis] * sum[CLUSTER_PATTERN + 3 * s + axis];
+  }
+  return frame;
 }
 
 const recurrences = new Map(); // result of recurrenceOf for each largest degree
@@ -312,8 +355,23 @@ function lungOf({ lungBegin }, vertex) {
   return lung;
 }
 
+/** Write the displacement of a vertex of the surface by mode k at weight and gain 1, mm, to `out`. */
+function modeOf({ clusters, clustered, clusterVectors, coefficients, direction, modes, surface, vector, vertices }, vertex, k, out) {
+  const [x, y, z] = surface.subarray(3 * vertex, 3 * vertex + 3);
+  for (let axis = 0; axis < 3; ++axis) {
+    if (clusters > 0) {
+      const at = (clustered[4 * vertex + 2] * modes + k) * CLUSTER_NUMBERS;
+      const [slope, pattern] = [at + CLUSTER_SLOPE + 3 * axis, at + CLUSTER_PATTERN + axis];
+      out[axis] = clusterVectors[at + axis] + clusterVectors[slope] * x + clusterVectors[slope + 1] * y + clusterVectors[slope + 2] * z
+        + clustered[4 * vertex] * clusterVectors[pattern] + clustered[4 * vertex + 1] * clusterVectors[pattern + 3];
+    } else {
+      out[axis] = vector ? coefficients[(axis * vertices + vertex) * modes + k] : coefficients[vertex * modes + k] * direction[3 * vertex + axis];
+    }
+  }
+}
+
 /** Write the displacement of a vertex of the surface by the modes at their weights, mm, before the gains multiply it,
- * to `out`. */
+ * to `out`. The basis has no clusters. */
 function fieldOf({ coefficients, direction, modes, vector, vertices }, weights, vertex, out) {
   for (let axis = 0; axis < 3; ++axis) {
     if (axis > 0 && !vector) {
@@ -328,6 +386,24 @@ function fieldOf({ coefficients, direction, modes, vector, vertices }, weights, 
 
 /** Compute the positions of the vertices `begin` to `end`, by default of all, in a state of the lungs, mm. */
 function placesOf(basis, moment, begin = 0, end = basis.vertices) {
+  return basis.clusters > 0 ? clusterPlaces(basis, framesOf(basis, moment), begin, end) : modePlaces(basis, moment, begin, end);
+}
+
+function clusterPlaces({ clustered, surface }, frames, begin, end) {
+  const places = new Float32Array(3 * (end - begin));
+  for (let v = begin; v < end; ++v) {
+    const at = FRAME * clustered[4 * v + 2];
+    for (let axis = 0; axis < 3; ++axis) {
+      let x = frames[at + axis];
+      for (let column = 0; column < 3; ++column) x += frames[at + 4 + 4 * column + axis] * surface[3 * v + column];
+      for (let s = 0; s < 2; ++s) x += frames[at + 16 + 4 * s + axis] * clustered[4 * v + s];
+      places[3 * (v - begin) + axis] = x;
+    }
+  }
+  return places;
+}
+
+function modePlaces(basis, moment, begin, end) {
   const places = new Float32Array(3 * (end - begin));
   const field = [0, 0, 0];
   let lung = lungOf(basis, begin);

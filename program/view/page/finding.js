@@ -46,11 +46,10 @@ function distancesOf(basis, after, before) {
 function squaresOf(basis) {
   const { modes, vertices } = basis;
   const sums = new Float64Array(basis.lungs * 3 * modes * modes);
-  const unitWeights = Array.from({ length: modes }, (_, k) => Float64Array.from({ length: modes }, (__, i) => (i === k ? 1 : 0)));
-  const by = unitWeights.map(() => [0, 0, 0]);
+  const by = Array.from({ length: modes }, () => [0, 0, 0]);
   for (let v = 0, lung = 0; v < vertices; ++v) {
     while (v >= basis.lungBegin[lung + 1]) ++lung;
-    unitWeights.forEach((weights, k) => fieldOf(basis, weights, v, by[k]));
+    by.forEach((displacement, k) => modeOf(basis, v, k, displacement));
     for (let axis = 0, at = 3 * lung * modes * modes; axis < 3; ++axis) {
       for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sums[at] += (by[k][axis] * by[l][axis]) / vertices;
     }

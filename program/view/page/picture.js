@@ -50,6 +50,15 @@ class Picture {
       coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, counts) };
   }
 
+  /** Return what capture() needs to deform the vertices of clusters: the shader program, the texture of the clusters'
+   * frames, a row of six texels for each, and `array`, the vertex array. */
+  clustered(array) {
+    const { gl, basis } = this;
+    const text = `${source('supine.glsl')}\n${source('cluster.vert.glsl')}`;
+    return { ...this.program('cluster.vert.glsl', null, ['moved'], text), array, count: basis.vertices,
+      frames: this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, FRAME / 4, basis.clusters, null) };
+  }
+
   program(vertex, fragment, outputs, text = source(vertex)) {
     const { gl } = this;
     const program = gl.createProgram();
@@ -81,17 +90,18 @@ class Picture {
     return made;
   }
 
-  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor], or null if it is not used. */
+  /** Return a vertex array. Each attribute is [buffer, size, stride, offset, divisor, type], or null if it is not used. The
+   * shader reads integers as floats. */
   array(attributes) {
     const { gl } = this;
     const made = gl.createVertexArray();
     gl.bindVertexArray(made);
     attributes.forEach((attribute, i) => {
       if (!attribute) return;
-      const [buffer, size, stride, offset, divisor = 0] = attribute;
+      const [buffer, size, stride, offset, divisor = 0, type = gl.FLOAT] = attribute;
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.enableVertexAttribArray(i);
-      gl.vertexAttribPointer(i, size, gl.FLOAT, false, stride, offset);
+      gl.vertexAttribPointer(i, size, type, false, stride, offset);
       gl.vertexAttribDivisor(i, divisor);
     });
     gl.bindVertexArray(null);
@@ -101,15 +111,21 @@ class Picture {
   /** Make the inputs of the shader that deforms the surface, for all vertices and for the few vertices that have
    * arrows. */
   makeInputs() {
-    const { basis } = this;
-    const inputs = (reference, direction) => this.array([[this.buffer(reference), 4, 16, 0], basis.vector ? null : [this.buffer(direction), 3, 12, 0]]);
-    const reference = new Float32Array(4 * basis.vertices);
-    for (let i = 0; i < basis.vertices; ++i) reference.set([...basis.surface.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
-    const every = Math.max(1, Math.floor(basis.vertices / ARROWS_SHOWN));
-    this.fewCount = Math.ceil(basis.vertices / every);
-    const few = (values, size) => Float32Array.from({ length: this.fewCount * size }, (_, i) => values[Math.floor(i / size) * every * size + (i % size)]);
-    this.inputs = this.deformed(basis.coefficients, basis.vertices, basis.vector ? 3 : 1, basis.unit, inputs(reference, basis.direction));
-    this.fewInputs = { ...this.inputs, array: inputs(few(reference, 4), few(basis.direction, 3)), count: this.fewCount, every };
+    const { gl, basis } = this;
+    const { clusters, clustered, direction, vector, vertices } = basis;
+    const reference = new Float32Array(4 * vertices);
+    for (let i = 0; i < vertices; ++i) reference.set([...basis.surface.subarray(3 * i, 3 * i + 3), lungOf(basis, i)], 4 * i);
+    const every = Math.max(1, Math.floor(vertices / ARROWS_SHOWN));
+    this.fewCount = Math.ceil(vertices / every);
+    const few = (values, size) => values.filter((_, i) => Math.floor(i / size) % every === 0);
+    const own = (pick) => { // the second attribute of vertices
+      if (clusters > 0) return [this.buffer(pick(clustered, 4)), 3, 8, 0, 0, gl.SHORT];
+      return vector ? null : [this.buffer(pick(direction, 3)), 3, 12, 0];
+    };
+    const inputs = (pick) => this.array([[this.buffer(pick(reference, 4)), 4, 16, 0], own(pick)]);
+    const all = inputs((values) => values);
+    this.inputs = clusters > 0 ? this.clustered(all) : this.deformed(basis.coefficients, vertices, vector ? 3 : 1, basis.unit, all);
+    this.fewInputs = { ...this.inputs, array: inputs(few), count: this.fewCount, every };
     this.makeFans();
   }
 
@@ -309,25 +325,13 @@ class Picture {
   }
 
   /** Run the shader program of `inputs` on their vertices, and store its output in the buffer `target`. `moment` is the
-   * state of the lungs if the inputs are those of deformed(), otherwise null. */
-  capture(moment, { program, at, array, count, coefficients, vertices, every, unit }, target) {
+   * state of the lungs if the inputs are those of deformed() or clustered(), otherwise null. */
+  capture(moment, inputs, target) {
     const { gl } = this;
+    const { program, array, count, frames } = inputs;
     gl.useProgram(program);
-    if (moment) {
-      const { basis } = this;
-      const stride = 4 * Math.ceil(basis.modes / 4);
-      const weights = new Float32Array(stride * (basis.order > 0 ? basis.lungs : 1));
-      for (let lung = 0; lung * stride < weights.length; ++lung) weights.set(weightsOf(basis, moment, lung), lung * stride);
-      gl.uniform4fv(at.supine_weights, weights);
-      gl.uniform3fv(at.supine_gains, moment.gains);
-      gl.uniform1i(at.vertices, vertices);
-      gl.uniform1i(at.every, every);
-      gl.uniform1f(at.unit, unit);
-      gl.uniform1i(at.coefficients, 2);
-      gl.activeTexture(gl.TEXTURE2);
-      gl.bindTexture(gl.TEXTURE_2D, coefficients);
-      gl.activeTexture(gl.TEXTURE0);
-    }
+    if (frames) this.useFrames(moment, inputs);
+    else if (moment) this.useModes(moment, inputs);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // WebGL refuses to write a buffer that is bound elsewhere
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
@@ -340,6 +344,33 @@ class Picture {
     gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
     gl.bindVertexArray(null);
+  }
+
+  /** Set the uniforms and the texture of deformed() for the state `moment`. */
+  useModes(moment, { at, coefficients, vertices, every, unit }) {
+    const { gl, basis } = this;
+    const stride = 4 * Math.ceil(basis.modes / 4);
+    const weights = new Float32Array(stride * (basis.order > 0 ? basis.lungs : 1));
+    for (let lung = 0; lung * stride < weights.length; ++lung) weights.set(weightsOf(basis, moment, lung), lung * stride);
+    gl.uniform4fv(at.supine_weights, weights);
+    gl.uniform3fv(at.supine_gains, moment.gains);
+    gl.uniform1i(at.vertices, vertices);
+    gl.uniform1i(at.every, every);
+    gl.uniform1f(at.unit, unit);
+    gl.uniform1i(at.coefficients, 2);
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, coefficients);
+    gl.activeTexture(gl.TEXTURE0);
+  }
+
+  /** Fill the texture of clustered() for the state `moment`. */
+  useFrames(moment, { at, frames }) {
+    const { gl, basis } = this;
+    gl.uniform1i(at.supine_frames, 2);
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, frames);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, FRAME / 4, basis.clusters, gl.RGBA, gl.FLOAT, framesOf(basis, moment));
+    gl.activeTexture(gl.TEXTURE0);
   }
 
   /** Deform the surface and the structures inside the lungs to the state `moment`, and store both under the name

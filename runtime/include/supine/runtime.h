@@ -429,7 +429,8 @@ enum { SUPINE_GL_MODES = 16, SUPINE_GL_FLOATS = 7, SUPINE_GL_VECTOR_FLOATS = 4 }
  * @param attributes  [end - begin, SUPINE_GL_FLOATS + K], or, if `vector` is true,
  *                    [end - begin, SUPINE_GL_VECTOR_FLOATS + 3 K], written; 44 or 64 bytes per
  *                    vertex if K is 4
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has more than SUPINE_GL_MODES modes, or clusters:
+ *                                   call supine_gl_pack_clusters */
 SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end,
                                         float *attributes);
 
@@ -440,6 +441,33 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
  * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
+
+/** A vertex of a basis of clusters in a vertex buffer for supine.glsl: 20 bytes. */
+typedef struct supine_gl_clustered_vertex {
+  float reference[3]; /**< reference position, mm: a vec3 at byte 0 */
+  int16_t scalars[2]; /**< a vec2 at byte 12, for glVertexAttribPointer, not normalised */
+  uint16_t cluster;   /**< index of the cluster: a uint at byte 16, for glVertexAttribIPointer */
+  uint16_t lung;      /**< index of the lung, which supine_normal needs: a uint at byte 18 */
+} supine_gl_clustered_vertex;
+
+/** Fill a vertex buffer for supine.glsl with vertices begin <= i < end of a basis of clusters,
+ * which may have any number of modes.
+ * @param vertices  [end - begin], written
+ * @retval SUPINE_ERROR_UNSUPPORTED  supine_basis_info.cluster_count is 0: call supine_gl_pack */
+SUPINE_API supine_status supine_gl_pack_clusters(const supine_basis *basis, size_t begin,
+                                                 size_t end, supine_gl_clustered_vertex *vertices);
+
+/** Floats of the frame of a cluster (supine_gl_frames). */
+enum { SUPINE_GL_FRAME_FLOATS = 24 };
+
+/** Compute the frames of the clusters in a pose: the texture supine_frames of supine.glsl, in which
+ * a row of six texels belongs to each cluster. The texture has the format GL_RGBA32F, one level,
+ * and the filters GL_NEAREST.
+ * @param frames  [cluster_count, SUPINE_GL_FRAME_FLOATS], written, for glTexSubImage2D with the
+ *                width 6 and the height cluster_count
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack_clusters */
+SUPINE_API supine_status supine_gl_frames(const supine_basis *basis, const supine_pose *pose,
+                                          float *frames);
 
 /** Pack the vectors whose weighted sum is the normal (supine_basis_info.normals) for supine.glsl,
  * of vertices begin <= i < end. Three vectors share the words of a uvec3, so that Q vectors need
