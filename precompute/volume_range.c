@@ -2,6 +2,7 @@
 /* Measure the volumes that the lungs of a basis can hold. */
 #include "precompute/volume_range.h"
 
+#include <stdint.h>
 #include <string.h>
 
 #include <supine/inputs.h>
@@ -13,13 +14,19 @@
 
 enum { SAMPLES_MAX = 10000, HALVINGS = 7 };
 
+/* Every few triangles of a lung, with the vertices that they have. */
+typedef struct sample {
+  supine_mesh mesh;   /* in the reference; its memory is in an arena */
+  const uint32_t *of; /* [mesh.vertex_count] vertex of the lung, counted from its first one */
+} sample;
+
 typedef struct measuring {
   const supine_basis *basis;
-  /* Every few triangles of each lung; vertices are counted from the first vertex of the lung. */
-  supine_mesh samples[SUPINE_STATE_LUNGS_MAX];
+  sample samples[SUPINE_STATE_LUNGS_MAX];
   size_t vertices_max; /* largest number of vertices of a lung */
+  size_t sampled_max;  /* largest number of vertices of a sample */
   float *xyz;          /* [threads, vertices_max, 3] workspace */
-  double *moved;       /* [threads, vertices_max, 3] workspace */
+  double *moved;       /* [threads, sampled_max, 3] workspace */
   double *range;
 } measuring;
 
@@ -30,7 +37,8 @@ static bool folds(const measuring *m, const double gravity[3], size_t lung, doub
   const size_t begin = info->lung_begin[lung];
   const size_t end = info->lung_begin[lung + 1];
   float *xyz = m->xyz + 3 * m->vertices_max * thread;
-  double *moved = m->moved + 3 * m->vertices_max * thread;
+  double *moved = m->moved + 3 * m->sampled_max * thread;
+  const sample *from = &m->samples[lung];
   supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]},
                         .lung_count = info->lung_count};
   supine_pose pose;
@@ -43,10 +51,12 @@ static bool folds(const measuring *m, const double gravity[3], size_t lung, doub
       supine_deform_range(m->basis, &pose, begin, end, xyz) != SUPINE_OK) {
     return true;
   }
-  for (size_t i = 0; i < 3 * (end - begin); ++i) {
-    moved[i] = (double)xyz[i];
+  for (size_t i = 0; i < from->mesh.vertex_count; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      moved[3 * i + k] = (double)xyz[3 * from->of[i] + k];
+    }
   }
-  const double share = supine_mesh_turned_over(&m->samples[lung], moved);
+  const double share = supine_mesh_turned_over(&from->mesh, moved);
   return supine_input_judge(SUPINE_INPUT_FOLDS, share) == SUPINE_INPUT_REFUSED;
 }
 
@@ -87,33 +97,51 @@ static void measure_nodes(void *context, size_t begin, size_t end, size_t thread
   }
 }
 
+/* Copy a corner of a triangle to the sample, if it is not there yet. Return its number there. */
+static uint32_t add_vertex(const float *vertices, uint32_t vertex, uint32_t *number, uint32_t *of,
+                           supine_mesh *taken) {
+  if (number[vertex] == UINT32_MAX) {
+    number[vertex] = (uint32_t)taken->vertex_count;
+    of[taken->vertex_count] = vertex;
+    for (size_t k = 0; k < 3; ++k) {
+      taken->vertices[3 * taken->vertex_count + k] = (double)vertices[3 * (size_t)vertex + k];
+    }
+    ++taken->vertex_count;
+  }
+  return number[vertex];
+}
+
 /* Sample the triangles of a lung, with its reference surface. */
 static void take_sample(const supine_basis *basis, size_t lung, supine_arena *arena,
-                        supine_mesh *taken) {
+                        sample *taken) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const uint32_t begin = (uint32_t)info->lung_begin[lung];
   const uint32_t end = (uint32_t)info->lung_begin[lung + 1];
   const size_t share = info->triangle_count * (end - begin) / info->vertex_count;
   const size_t stride = 1 + share / SAMPLES_MAX;
-  double *vertices = supine_arena_take(arena, 3 * (size_t)(end - begin), sizeof *vertices);
-  uint32_t *triangles = supine_arena_take(arena, 3 * info->triangle_count, sizeof *triangles);
-  size_t count = 0;
+  const size_t most = 1 + info->triangle_count / stride;
+  uint32_t *number = supine_arena_take(arena, end - begin, sizeof *number);
+  uint32_t *of = supine_arena_take(arena, end - begin, sizeof *of);
+  supine_mesh *mesh = &taken->mesh;
+  mesh->vertices = supine_arena_take(arena, 3 * (size_t)(end - begin), sizeof *mesh->vertices);
+  mesh->triangles = supine_arena_take(arena, 3 * most, sizeof *mesh->triangles);
   if (supine_arena_status(arena) != SUPINE_OK) {
     return;
   }
-  for (size_t i = 0; i < 3 * (size_t)(end - begin); ++i) {
-    vertices[i] = (double)info->vertices[3 * begin + i];
+  for (uint32_t i = 0; i < end - begin; ++i) {
+    number[i] = UINT32_MAX;
   }
   for (size_t t = 0; t < info->triangle_count; t += stride) {
     const uint32_t *corner = info->triangles + 3 * t;
     if (corner[0] >= begin && corner[0] < end) {
       for (size_t k = 0; k < 3; ++k) {
-        triangles[3 * count + k] = corner[k] - begin;
+        mesh->triangles[3 * mesh->triangle_count + k] =
+            add_vertex(info->vertices + 3 * (size_t)begin, corner[k] - begin, number, of, mesh);
       }
-      ++count;
+      ++mesh->triangle_count;
     }
   }
-  *taken = (supine_mesh){end - begin, vertices, count, triangles};
+  taken->of = of;
 }
 
 supine_status supine_precompute_volume_range(const supine_basis *basis, double *range,
@@ -124,11 +152,13 @@ supine_status supine_precompute_volume_range(const supine_basis *basis, double *
   measuring m = {.basis = basis, .range = range};
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const size_t count = info->lung_begin[lung + 1] - info->lung_begin[lung];
-    m.vertices_max = count > m.vertices_max ? count : m.vertices_max;
     take_sample(basis, lung, &arena, &m.samples[lung]);
+    const size_t sampled = m.samples[lung].mesh.vertex_count;
+    m.vertices_max = count > m.vertices_max ? count : m.vertices_max;
+    m.sampled_max = sampled > m.sampled_max ? sampled : m.sampled_max;
   }
   m.xyz = supine_arena_take(&arena, threads * 3 * m.vertices_max, sizeof *m.xyz);
-  m.moved = supine_arena_take(&arena, threads * 3 * m.vertices_max, sizeof *m.moved);
+  m.moved = supine_arena_take(&arena, threads * 3 * m.sampled_max, sizeof *m.moved);
   SUPINE_TRY(supine_arena_check(&arena, error, "the range of volumes of %zu vertices",
                                 info->vertex_count));
   supine_parallel_for(SUPINE_RANGE_NODES, 1, threads, measure_nodes, &m);
