@@ -464,6 +464,37 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   return supine_simulated_find_default(basis, &s->usual);
 }
 
+/* Read the optional metadata about collapsed lungs: the share of its volume that each lung has kept,
+ * and the point about which it has shrunk. A file with shares alone has no scan before the collapse.
+ */
+static supine_status check_collapse(const check *c, supine_basis *basis) {
+  static const double least_share = 1e-6, farthest_hilum_mm = 1e6;
+  double share[SUPINE_LUNGS_MAX];
+  if (supine_safetensors_metadata(c->file, "lung_hilum_mm") == NULL) {
+    return SUPINE_OK;
+  }
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    share[lung] = 1;
+  }
+  SUPINE_TRY(read_numbers(c, "lung_share", basis->info.lung_count, share));
+  SUPINE_TRY(read_numbers(c, "lung_hilum_mm", 3 * basis->info.lung_count, basis->hilum[0]));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    if (!(share[lung] >= least_share && share[lung] <= 1)) {
+      return refuse(c, "metadata 'lung_share' has %g: it must be %g to 1", share[lung],
+                    least_share);
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      if (!(fabs(basis->hilum[lung][k]) <= farthest_hilum_mm)) {
+        return refuse(c, "metadata 'lung_hilum_mm' has %g, beyond %g", basis->hilum[lung][k],
+                      farthest_hilum_mm);
+      }
+    }
+    basis->scan_expansion[lung] = 1 / cbrt(share[lung]) - 1;
+  }
+  basis->info.hilum = basis->hilum[0];
+  return SUPINE_OK;
+}
+
 /* Check the optional tensor 'volume_range': the volumes that each lung can hold. */
 static supine_status check_range(const check *c, supine_basis *basis) {
   if (supine_safetensors_find(c->file, "volume_range") == NULL) {
@@ -690,7 +721,7 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   static supine_status (*const steps[])(const check *, supine_basis *) = {
       check_numbers, check_surface,   check_field,    check_modes,  check_lungs, check_weights,
       check_volume,  check_reference, check_rest,     check_range,  check_scan,  check_simulated,
-      check_normals, check_rigid,     check_expected, check_errors, check_names, identify};
+      check_normals, check_rigid,     check_expected, check_errors, check_collapse, check_names, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }
