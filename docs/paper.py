@@ -203,5 +203,5 @@ names.
 | V, a breath of 500 mL over 5 s in steps of 4.5 and 2.25 mL, 15 ms per frame (500 mL / (66.66 frames/s x 5 s) = 1.5 mL) | `supine breathe --course flow`, `supine_step` | three additions per vertex and step (`test_deform`) | only for a straight path (`paper`) |
 | V, evaluation in a vertex shader | `runtime/supine.glsl`, `supine export` | positions equal those of the library within 0.001 mm (`test_glsl`) | |
 | VI, a loop of augmented reality: tracked pose in, deformed lungs out | `supine stream` (OpenIGTLink, live page), the page's headset mode | `stream_*` tests | tried with simulated trackers and an emulated headset only |
-| VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | a collapsed lung is the reference of its basis, so that the collapse is in no displacement; with a volume for each lung (`--volume left=700mL,right=1400mL`) it is, but the law moves the lung to the back and the head, not to its hilum |
+| VI, a patient's own lungs, disease | `supine fit`, `--lesion`, `--lung` | | a collapsed lung shrinks evenly about its hilum: the collapse is the displacement from the scan (`deform --from scan`, `embed`, images). With a volume for each lung (`--volume left=700mL,right=1400mL`) instead, the law moves the lung to the back and the head, not to its hilum |
 """.rstrip())

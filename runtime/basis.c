@@ -464,8 +464,9 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   return supine_simulated_find_default(basis, &s->usual);
 }
 
-/* Read the optional metadata about collapsed lungs: the share of its volume that each lung has kept,
- * and the point about which it has shrunk. A file with shares alone has no scan before the collapse.
+/* Read the optional metadata about collapsed lungs: the share of its volume that each lung has
+ * kept, and the point about which it has shrunk. A file with shares alone has no scan before the
+ * collapse.
  */
 static supine_status check_collapse(const check *c, supine_basis *basis) {
   static const double least_share = 1e-6, farthest_hilum_mm = 1e6;
@@ -719,9 +720,10 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_numbers, check_surface,   check_field,    check_modes,  check_lungs, check_weights,
-      check_volume,  check_reference, check_rest,     check_range,  check_scan,  check_simulated,
-      check_normals, check_rigid,     check_expected, check_errors, check_collapse, check_names, identify};
+      check_numbers, check_surface,   check_field,     check_modes, check_lungs,
+      check_weights, check_volume,    check_reference, check_rest,  check_range,
+      check_scan,    check_simulated, check_normals,   check_rigid, check_expected,
+      check_errors,  check_collapse,  check_names,     identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

@@ -63,7 +63,7 @@ static void deform_clusters(const supine_basis *basis, const supine_pose *pose, 
 
 /* Evaluate vertices begin <= i < end of all lungs as the modes move them. */
 static void deform_by_modes(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target) {
+                            size_t end, const supine_target *target) {
   float scales[SUPINE_MODES_MAX + 3];
   if (basis->info.cluster_count > 0) {
     deform_clusters(basis, pose, begin, end, target);

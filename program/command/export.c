@@ -91,8 +91,8 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
   return SUPINE_OK;
 }
 
-/* Return whether a state is the scan of a lung that the basis holds as collapsed. The page moves the
- * lungs by modes alone, so that it cannot show this state. */
+/* Return whether a state is the scan of a lung that the basis holds as collapsed. The page moves
+ * the lungs by modes alone, so that it cannot show this state. */
 static bool is_before_collapse(const supine_basis *basis,
                                const supine_options_reference_pose *state) {
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {

@@ -156,8 +156,8 @@ typedef struct supine_basis_info {
    * two vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
    * a_1 P_1. NULL if there are no clusters. */
   const float *cluster_vectors;
-  /** [lung_count, 3] hilum, mm, about which a collapsed lung has shrunk (supine_basis_scan), or NULL
-   * if no lung of the file is collapsed. */
+  /** [lung_count, 3] hilum, mm, about which a collapsed lung has shrunk (supine_basis_scan), or
+   * NULL if no lung of the file is collapsed. */
   const double *hilum;
 } supine_basis_info;
 
@@ -172,8 +172,8 @@ typedef struct supine_pose {
    * is not checked: a program may set the weights of a pose itself. Weights and gains must be
    * finite and below 2^20; otherwise the status is SUPINE_ERROR_ARGUMENT too. */
   uint64_t basis;
-  /** [lung_count] The deformed lung is stretched about its hilum by 1 + expansion. It is 0 but in the
-   * scan of a lung that the file holds as collapsed (supine_basis_scan_pose). */
+  /** [lung_count] The deformed lung is stretched about its hilum by 1 + expansion. It is 0 but in
+   * the scan of a lung that the file holds as collapsed (supine_basis_scan_pose). */
   double expansion[SUPINE_LUNGS_MAX];
 } supine_pose;
 
@@ -289,8 +289,8 @@ SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const sup
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
 /** Multiply the displacements of a pose by `gain`: set its gains for all lungs and axes to this
- * number, and its expansions to 0. Use this where the gains do not follow from a volume: for open surfaces, or for
- * displacements from another simulator, which a gain of 1 reproduces. */
+ * number, and its expansions to 0. Use this where the gains do not follow from a volume: for open
+ * surfaces, or for displacements from another simulator, which a gain of 1 reproduces. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
 /** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN.
