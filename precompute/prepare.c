@@ -323,10 +323,11 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
         p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
-    supine_text_add(p->assumed, size,
-                    "; collapsed in every state but the scan: at the inflation of the scan to %.0f "
-                    "mL, towards the hilum (assumed)",
-                    collapsed);
+    supine_text_add(
+        p->assumed, size,
+        "; collapsed evenly towards the hilum (assumed), in every state but the scan: to "
+        "%.0f mL at the inflation of the scan",
+        collapsed);
   }
 }
 
