@@ -464,33 +464,22 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   return supine_simulated_find_default(basis, &s->usual);
 }
 
-/* Read the optional metadata about collapsed lungs: the share of its volume that each lung has
- * kept, and the point about which it has shrunk. A file with shares alone has no scan before the
- * collapse.
- */
+/* Read the optional metadata about lungs that the file holds as collapsed: the factor on their
+ * lengths in the scan minus 1, and the point about which they have shrunk. */
 static supine_status check_collapse(const check *c, supine_basis *basis) {
-  static const double least_share = 1e-6, farthest_hilum_mm = 1e6;
-  double share[SUPINE_LUNGS_MAX];
+  static const double most = 100;
+  const size_t count = basis->info.lung_count;
   if (supine_safetensors_metadata(c->file, "lung_hilum_mm") == NULL) {
     return SUPINE_OK;
   }
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    share[lung] = 1;
+  SUPINE_TRY(read_numbers(c, "lung_expansion", count, basis->scan_expansion));
+  SUPINE_TRY(read_numbers(c, "lung_hilum_mm", 3 * count, basis->hilum[0]));
+  bool good = supine_pose_is_finite(basis->hilum[0], 3 * count);
+  for (size_t lung = 0; lung < count; ++lung) {
+    good = good && basis->scan_expansion[lung] >= 0 && basis->scan_expansion[lung] <= most;
   }
-  SUPINE_TRY(read_numbers(c, "lung_share", basis->info.lung_count, share));
-  SUPINE_TRY(read_numbers(c, "lung_hilum_mm", 3 * basis->info.lung_count, basis->hilum[0]));
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    if (!(share[lung] >= least_share && share[lung] <= 1)) {
-      return refuse(c, "metadata 'lung_share' has %g: it must be %g to 1", share[lung],
-                    least_share);
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      if (!(fabs(basis->hilum[lung][k]) <= farthest_hilum_mm)) {
-        return refuse(c, "metadata 'lung_hilum_mm' has %g, beyond %g", basis->hilum[lung][k],
-                      farthest_hilum_mm);
-      }
-    }
-    basis->scan_expansion[lung] = 1 / cbrt(share[lung]) - 1;
+  if (!good) {
+    return refuse(c, "metadata 'lung_expansion' or 'lung_hilum_mm' is out of range");
   }
   basis->info.hilum = basis->hilum[0];
   return SUPINE_OK;

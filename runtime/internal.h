@@ -136,13 +136,7 @@ static inline bool supine_basis_has_pose(const supine_basis *basis, const supine
 }
 
 /** Return the largest expansion of a lung in a pose; 0 if all lungs are as the modes move them. */
-static inline double supine_basis_expansion(const supine_basis *basis, const supine_pose *pose) {
-  double largest = 0;
-  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-    largest = fmax(largest, fabs(pose->expansion[lung]));
-  }
-  return largest;
-}
+double supine_basis_expansion(const supine_basis *basis, const supine_pose *pose);
 
 /** Return whether a pose can be evaluated at vertices begin <= i < end of a basis. */
 static inline bool supine_basis_has_range(const supine_basis *basis, const supine_pose *pose,

@@ -256,6 +256,14 @@ static supine_status find_gains(const supine_basis *basis, const supine_state *s
   return total_gains(basis, &v, total, pose, error);
 }
 
+double supine_basis_expansion(const supine_basis *basis, const supine_pose *pose) {
+  double largest = 0;
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    largest = fmax(largest, fabs(pose->expansion[lung]));
+  }
+  return largest;
+}
+
 bool supine_basis_is_scan(const supine_basis *basis, const supine_state *state) {
   double unit[3];
   return state->lung_count == 0 && state->volume.kind == SUPINE_VOLUME_SCAN &&
@@ -316,7 +324,8 @@ supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose 
     supine_basis_contract(basis, lung, supine_basis_lung_weights(basis, pose, lung), &form);
     volumes_ml[lung] =
         basis->info.reference_volume[lung] + supine_volume_form_at(&form, pose->gains[lung]);
-    volumes_ml[lung] *= pow(1 + pose->expansion[lung], 3);
+    const double length = 1 + pose->expansion[lung];
+    volumes_ml[lung] *= length * length * length;
   }
   return SUPINE_OK;
 }

@@ -376,13 +376,13 @@ TEST(test_open_implausible_metadata_refused) {
 }
 
 TEST(test_open_implausible_collapse_refused) {
-  static const char *const shares[] = {"0", "-0.5", "1.5", "nan", "0.5,0.5", "0.5"};
-  for (size_t i = 0; i < sizeof shares / sizeof *shares; ++i) {
+  static const char *const expansions[] = {"-0.5", "101", "nan", "0.5,0.5", "0.26"};
+  for (size_t i = 0; i < sizeof expansions / sizeof *expansions; ++i) {
     parts p = sound();
-    p.metadata[p.metadata_count++] = (supine_metadata){"lung_share", shares[i]};
+    p.metadata[p.metadata_count++] = (supine_metadata){"lung_expansion", expansions[i]};
     p.metadata[p.metadata_count++] = (supine_metadata){"lung_hilum_mm", "10,20,30"};
-    p.message = "lung_share";
-    const bool good = i + 1 == sizeof shares / sizeof *shares;
+    p.message = "lung_expansion";
+    const bool good = i + 1 == sizeof expansions / sizeof *expansions;
     assert_int_equal(open_parts(&p), good ? SUPINE_OK : SUPINE_ERROR_FORMAT);
   }
 }

@@ -297,9 +297,10 @@ SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
  *
  * A lung that the file holds as collapsed, with a share c of its volume (metadata `lung_share`), is
  * collapsed in all states but this one, which is the scan itself: there, its vertices lie at
- * h + (x - h) / c^(1/3), where x is their position in the collapsed lung at the inflation of the
- * scan, and h the hilum (metadata `lung_hilum_mm`). Any other volume relative to the scan is added
- * to that of the lung that is collapsed at the inflation of the scan. */
+ * h + (1 + e) (x - h), e = c^(-1/3) - 1 (metadata `lung_expansion`), where x is their position in
+ * the collapsed lung at the inflation of the scan, and h the hilum (metadata `lung_hilum_mm`). Any
+ * other volume relative to the scan is added to that of the lung that is collapsed at the inflation
+ * of the scan. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the pose of the lungs as they are in the scan. For displacements from another simulator
