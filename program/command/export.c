@@ -114,8 +114,8 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
         supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[*count], error));
     bool again = is_before_collapse(basis, &found[*count]);
     SUPINE_REFUSE_IF(again && from->given && i == 0, error, SUPINE_ERROR_UNSUPPORTED,
-                     "a page cannot show the scan of a collapsed lung: measure from another state, "
-                     "such as --from supine:rest");
+                     "--from: a page cannot show lungs before their collapse, as in the scan: give "
+                     "another state, such as supine:rest");
     for (size_t j = 0; j < *count; ++j) {
       again = again || strcmp(found[j].name, found[*count].name) == 0;
     }

@@ -399,6 +399,77 @@ TEST(test_collapsed_lung_scan_pose_compared_and_refused_by_shader) {
   supine_basis_close(basis);
 }
 
+/* Write a tetrahedron with edges of 14 mm around a point in the left lung. */
+static void write_tumour(const char *path, double corners[4][3]) {
+  double given[INSIDE][3];
+  uint32_t faces[12] = {0, 1, 2, 0, 3, 1, 0, 2, 3, 1, 3, 2};
+  supine_mesh mesh = {4, corners[0], 4, faces};
+  write_points_inside(given);
+  for (size_t i = 0; i < 4; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      corners[i][k] = given[1][k] + (i == 0 || i == k + 1 ? 5.0 : -5.0);
+    }
+  }
+  assert_int_equal(supine_mesh_save(path, &mesh, NULL, NULL), SUPINE_OK);
+}
+
+/* A rigid tumour moves to the hilum with its collapsed lung, but keeps its size. In the scan, it is
+ * where it was scanned. */
+TEST(test_collapsed_lung_rigid_tumour_keeps_size) {
+  double corners[4][3];
+  char tumour[80];
+  char inside[80];
+  (void)snprintf(tumour, sizeof tumour, "%s.ply", other);
+  (void)snprintf(inside, sizeof inside, "%s.inside", other);
+  write_tumour(tumour, corners);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--scanned", "supine:rest", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(COMMAND_RUN(&supine_command_embed, KEPT_ERR, text, other, tumour, "--rigid",
+                               "all", "-o", inside),
+                   SUPINE_EXIT_OK);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open(inside, &basis, NULL), SUPINE_OK);
+  float *scan = positions_at(basis, "supine:scan", NULL);
+  float *now = positions_at(basis, "prone:rest", NULL);
+  double moved = 0.0;
+  for (size_t i = 0; i < 4; ++i) {
+    double square = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      assert_close((double)scan[3 * i + k], corners[i][k], 1e-3);
+      const double edge = (double)now[3 * i + k] - (double)now[3 * ((i + 1) % 4) + k];
+      square += edge * edge;
+    }
+    moved = fmax(moved, fabs((double)now[3 * i] - corners[i][0]));
+    assert_close(sqrt(square), 10.0 * sqrt(2.0), 1e-3);
+  }
+  assert_true(moved > 3.0);
+  free(scan);
+  free(now);
+  supine_basis_close(basis);
+  (void)unlink(tumour);
+  (void)unlink(inside);
+}
+
+/* What moves lungs by modes alone has no scan before the collapse. */
+TEST(test_collapsed_lung_scan_refused_by_page_and_stream) {
+  char page[80];
+  (void)snprintf(page, sizeof page, "%s.html", other);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(
+      COMMAND_RUN(&supine_command_export, KEPT_ERR, text, other, "--from", "scan", "-o", page),
+      SUPINE_EXIT_UNSUPPORTED);
+  assert_says(text, "before their collapse");
+  assert_int_equal(COMMAND_RUN(&supine_command_stream, KEPT_ERR, text, other, "--volume", "scan"),
+                   SUPINE_EXIT_UNSUPPORTED);
+  assert_says(text, "before their collapse");
+  assert_int_equal(COMMAND_RUN(&supine_command_export, KEPT_ERR, text, other, "-o", page),
+                   SUPINE_EXIT_OK);
+  (void)unlink(page);
+}
+
 /* A breath begins in the collapsed lung, also if its volume counts from the scan. */
 TEST(test_breath_of_collapsed_lung_without_rest_begins_collapsed) {
   assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
