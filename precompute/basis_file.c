@@ -194,7 +194,20 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
   add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   if (share[0] != 1.0 || share[1] != 1.0) {
+    double hilum[2][3];
+    double expansion[2]; /* factor on the lengths in the scan minus 1 */
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      supine_lungs_find_hilum(lungs, lung, hilum[lung]);
+      expansion[lung] = 1.0 / cbrt(share[lung]) - 1.0;
+    }
     add_by_lung(list, "lung_share", lungs->lung_count, share);
+    add_by_lung(list, "lung_expansion", lungs->lung_count, expansion);
+    if (lungs->lung_count == 2) {
+      add(list, "lung_hilum_mm", "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", hilum[0][0], hilum[0][1],
+          hilum[0][2], hilum[1][0], hilum[1][1], hilum[1][2]);
+    } else {
+      add(list, "lung_hilum_mm", "%.9g,%.9g,%.9g", hilum[0][0], hilum[0][1], hilum[0][2]);
+    }
   }
 }
 

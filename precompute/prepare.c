@@ -317,17 +317,17 @@ static void summarize(const knowledge *given, bool predicted, supine_prepared *p
     supine_text_add(p->assumed, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
   }
   supine_text_add(p->assumed, size, "by %s)", source_of_rest(resting, predicted, p));
-  double collapsed = 0.0; /* volume in the scan as the basis holds it, mL */
+  double collapsed = 0.0; /* volume of the collapsed lungs at the inflation of the scan, mL */
   for (size_t lung = 0; lung < reference->lung_count; ++lung) {
     collapsed +=
         p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
   }
   if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
-    supine_text_add(p->assumed, size,
-                    "; collapsed in every state, also in the scan, which then holds %.0f mL: no "
-                    "displacement contains the collapse. For one that does, make the basis without "
-                    "the collapse, and ask for a volume of each lung",
-                    collapsed);
+    supine_text_add(
+        p->assumed, size,
+        "; collapsed evenly towards the hilum (assumed), in every state but the scan: to "
+        "%.0f mL at the inflation of the scan",
+        collapsed);
   }
 }
 

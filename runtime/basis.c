@@ -464,6 +464,27 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   return supine_simulated_find_default(basis, &s->usual);
 }
 
+/* Read the optional metadata about lungs that the file holds as collapsed: the factor on their
+ * lengths in the scan minus 1, and the point about which they have shrunk. */
+static supine_status check_collapse(const check *c, supine_basis *basis) {
+  static const double most = 100;
+  const size_t count = basis->info.lung_count;
+  if (supine_safetensors_metadata(c->file, "lung_hilum_mm") == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(read_numbers(c, "lung_expansion", count, basis->scan_expansion));
+  SUPINE_TRY(read_numbers(c, "lung_hilum_mm", 3 * count, basis->hilum[0]));
+  bool good = supine_pose_is_finite(basis->hilum[0], 3 * count);
+  for (size_t lung = 0; lung < count; ++lung) {
+    good = good && basis->scan_expansion[lung] >= 0 && basis->scan_expansion[lung] <= most;
+  }
+  if (!good) {
+    return refuse(c, "metadata 'lung_expansion' or 'lung_hilum_mm' is out of range");
+  }
+  basis->info.hilum = basis->hilum[0];
+  return SUPINE_OK;
+}
+
 /* Check the optional tensor 'volume_range': the volumes that each lung can hold. */
 static supine_status check_range(const check *c, supine_basis *basis) {
   if (supine_safetensors_find(c->file, "volume_range") == NULL) {
@@ -688,9 +709,10 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_numbers, check_surface,   check_field,    check_modes,  check_lungs, check_weights,
-      check_volume,  check_reference, check_rest,     check_range,  check_scan,  check_simulated,
-      check_normals, check_rigid,     check_expected, check_errors, check_names, identify};
+      check_numbers, check_surface,   check_field,     check_modes, check_lungs,
+      check_weights, check_volume,    check_reference, check_rest,  check_range,
+      check_scan,    check_simulated, check_normals,   check_rigid, check_expected,
+      check_errors,  check_collapse,  check_names,     identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

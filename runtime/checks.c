@@ -53,12 +53,6 @@ static void describe_share(const char *whose, double volume, double full, char *
       100 * supine_input_get(SUPINE_INPUT_VOLUME_MOST)->refused);
 }
 
-/* Return whether a state is that of the scan, which was observed. */
-static bool is_scan(const supine_basis *basis, const supine_state *state) {
-  return state->lung_count == 0 && state->volume.kind == SUPINE_VOLUME_SCAN &&
-         state->volume.ml == 0 && supine_distance(state->gravity, basis->scan_gravity) < 1e-6;
-}
-
 bool supine_basis_has_range_of_volumes(const supine_basis *basis) {
   return basis->volume_range != NULL;
 }
@@ -69,7 +63,7 @@ bool supine_basis_can_hold(const supine_basis *basis, const supine_state *state,
   double volumes[SUPINE_LUNGS_MAX];
   double total = 0;
   double full = 0;
-  if (basis->volume_range == NULL || is_scan(basis, state) ||
+  if (basis->volume_range == NULL || supine_basis_is_scan(basis, state) ||
       supine_basis_volumes(basis, pose, volumes) != SUPINE_OK) {
     return true;
   }
@@ -129,6 +123,7 @@ supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pos
   const supine_state scan = supine_basis_scan(basis);
   if (basis->info.is_fields) {
     *pose = (supine_pose){.basis = basis->info.identity};
+    memcpy(pose->expansion, basis->scan_expansion, sizeof pose->expansion);
     return SUPINE_OK;
   }
   return supine_basis_pose_any(basis, &scan, pose, error);

@@ -61,9 +61,9 @@ static void deform_clusters(const supine_basis *basis, const supine_pose *pose, 
   supine_deform_lung(basis->kernels->cluster, &basis->tiles, frames, begin, end, target);
 }
 
-/* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
-static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
-                         size_t end, const supine_target *target) {
+/* Evaluate vertices begin <= i < end of all lungs as the modes move them. */
+static void deform_by_modes(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                            size_t end, const supine_target *target) {
   float scales[SUPINE_MODES_MAX + 3];
   if (basis->info.cluster_count > 0) {
     deform_clusters(basis, pose, begin, end, target);
@@ -77,6 +77,34 @@ static void deform_lungs(const supine_basis *basis, const supine_pose *pose, siz
       weigh(basis, pose, lung, scales);
       supine_deform_lung(basis->kernels->deform, &basis->tiles, scales, first, last, &here);
     }
+  }
+}
+
+/* Stretch the lungs about their hila by 1 + pose->expansion, at vertices begin <= i < end. */
+static void expand_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    const double by = pose->expansion[lung];
+    const double *hilum = basis->hilum[lung];
+    const size_t first = basis->lung_begin[lung] > begin ? basis->lung_begin[lung] : begin;
+    const size_t last = basis->lung_begin[lung + 1] < end ? basis->lung_begin[lung + 1] : end;
+    for (size_t i = first; i < last; ++i) {
+      for (size_t a = 0; a < 3; ++a) {
+        float *x = target->xyz + 3 * (i - begin) + a;
+        const double reference = (double)basis->info.vertices[3 * i + a];
+        const double at = (double)*x + (target->add_reference ? 0 : reference);
+        *x = (float)((double)*x + by * (at - hilum[a]));
+      }
+    }
+  }
+}
+
+/* Evaluate vertices begin <= i < end of all lungs as if no part were rigid. */
+static void deform_lungs(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                         size_t end, const supine_target *target) {
+  deform_by_modes(basis, pose, begin, end, target);
+  if (supine_basis_expansion(basis, pose) > 0) {
+    expand_lungs(basis, pose, begin, end, target);
   }
 }
 

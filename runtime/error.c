@@ -28,8 +28,13 @@ double supine_basis_error(const supine_basis *basis, const supine_pose *pose) {
    * and in the sum over the modes. Adding the reference position rounds once more. */
   const double rounding =
       ((double)modes + 8) * unit * scale * moved + unit * (basis->reference_size + scale * moved);
+  /* An expansion multiplies all errors, and rounds once more. */
+  const double expansion = supine_basis_expansion(basis, pose);
+  const double size = basis->reference_size + scale * moved;
+  const double expanded = expansion > 0 ? 2 * unit * (1 + 2 * expansion) * size : 0;
   return supine_basis_has_pose(basis, pose)
-             ? 1.001 * (scale * stored + basis->reference_error + rounding)
+             ? 1.001 * ((1 + expansion) * (scale * stored + basis->reference_error + rounding) +
+                        expanded)
              : INFINITY;
 }
 

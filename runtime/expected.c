@@ -188,8 +188,12 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   const double square = basis->squares != NULL
                             ? mean_square_of_lungs(basis, &m->pose[0], &m->pose[1])
                             : mean_square(basis, &m->pose[0], &m->pose[1]);
-  const double rms = fmax(least, sqrt(square));
-  m->law = own * fmin(1, rms / number_of(basis, "expected_error_from_mm", EXPECTED_FULL_BREATH));
+  const double full = number_of(basis, "expected_error_from_mm", EXPECTED_FULL_BREATH);
+  double rms = fmax(least, sqrt(square));
+  if (supine_basis_expansion(basis, &m->pose[0]) != supine_basis_expansion(basis, &m->pose[1])) {
+    rms = fmax(rms, full); /* take a collapse as no smaller than a full breath */
+  }
+  m->law = own * fmin(1, rms / full);
   if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
     m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / EXPECTED_FULL_BREATH) - m->law);
   }

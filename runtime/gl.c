@@ -47,6 +47,9 @@ supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *po
   if (!fits(basis) || !supine_basis_has_pose(basis, pose)) {
     return fits(basis) ? SUPINE_ERROR_ARGUMENT : SUPINE_ERROR_UNSUPPORTED;
   }
+  if (supine_basis_expansion(basis, pose) > 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
   for (size_t i = 0; i < rows * stride; ++i) {
     const double *of = supine_basis_lung_weights(basis, pose, i / stride);
     weights[i] = i % stride < modes ? (float)of[i % stride] : 0;

@@ -75,6 +75,9 @@ struct supine_basis {
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
+  double hilum[SUPINE_LUNGS_MAX][3]; /**< point about which a collapsed lung has shrunk, mm */
+  /** [lung_count] supine_pose.expansion in the scan; 0 for a lung that is not collapsed */
+  double scan_expansion[SUPINE_LUNGS_MAX];
   /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
    * if the file has none */
   const double *volume_range;
@@ -128,8 +131,12 @@ static inline bool supine_basis_made_pose(const supine_basis *basis, const supin
 static inline bool supine_basis_has_pose(const supine_basis *basis, const supine_pose *pose) {
   return supine_basis_made_pose(basis, pose) &&
          supine_pose_is_finite(pose->weights, supine_basis_weight_count(basis)) &&
-         supine_pose_is_finite(pose->gains[0], 3 * basis->info.lung_count);
+         supine_pose_is_finite(pose->gains[0], 3 * basis->info.lung_count) &&
+         supine_pose_is_finite(pose->expansion, basis->info.lung_count);
 }
+
+/** Return the largest expansion of a lung in a pose; 0 if all lungs are as the modes move them. */
+double supine_basis_expansion(const supine_basis *basis, const supine_pose *pose);
 
 /** Return whether a pose can be evaluated at vertices begin <= i < end of a basis. */
 static inline bool supine_basis_has_range(const supine_basis *basis, const supine_pose *pose,
@@ -176,6 +183,9 @@ const float *supine_basis_rows(const supine_basis *basis, size_t i, float *compu
 /** Compute the volume of a lung, at given weights, as a polynomial of its gains. */
 void supine_basis_contract(const supine_basis *basis, size_t lung, const double *weights,
                            supine_volume_form *form);
+
+/** Return whether a state is that of the scan. */
+bool supine_basis_is_scan(const supine_basis *basis, const supine_state *state);
 
 /** Compute a pose as supine_basis_pose does, but also for volumes that lungs cannot hold. */
 supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,

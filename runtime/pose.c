@@ -256,9 +256,24 @@ static supine_status find_gains(const supine_basis *basis, const supine_state *s
   return total_gains(basis, &v, total, pose, error);
 }
 
-supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
-                                    supine_pose *pose, supine_error *error) {
-  SUPINE_TRY(check_state(state, error));
+double supine_basis_expansion(const supine_basis *basis, const supine_pose *pose) {
+  double largest = 0;
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    largest = fmax(largest, fabs(pose->expansion[lung]));
+  }
+  return largest;
+}
+
+bool supine_basis_is_scan(const supine_basis *basis, const supine_state *state) {
+  double unit[3];
+  return state->lung_count == 0 && state->volume.kind == SUPINE_VOLUME_SCAN &&
+         state->volume.ml == 0 && supine_normalise(state->gravity, unit) &&
+         supine_distance(unit, basis->scan_gravity) < 1e-6;
+}
+
+/* Find the weights and the gains of a pose. */
+static supine_status move_modes(const supine_basis *basis, const supine_state *state,
+                                supine_pose *pose, supine_error *error) {
   pose->basis = basis->info.identity;
   if (basis->info.order > 0) {
     double unit[3];
@@ -273,12 +288,24 @@ supine_status supine_basis_pose_any(const supine_basis *basis, const supine_stat
   return find_gains(basis, state, pose, error);
 }
 
+supine_status supine_basis_pose_any(const supine_basis *basis, const supine_state *state,
+                                    supine_pose *pose, supine_error *error) {
+  SUPINE_TRY(check_state(state, error));
+  SUPINE_TRY(move_modes(basis, state, pose, error));
+  memset(pose->expansion, 0, sizeof pose->expansion);
+  if (supine_basis_is_scan(basis, state)) {
+    memcpy(pose->expansion, basis->scan_expansion, sizeof pose->expansion);
+  }
+  return SUPINE_OK;
+}
+
 void supine_pose_fill(supine_pose *pose, double gain) {
   for (size_t lung = 0; lung < SUPINE_LUNGS_MAX; ++lung) {
     for (size_t axis = 0; axis < 3; ++axis) {
       pose->gains[lung][axis] = gain;
     }
   }
+  memset(pose->expansion, 0, sizeof pose->expansion);
 }
 
 supine_state supine_basis_scan(const supine_basis *basis) {
@@ -297,6 +324,8 @@ supine_status supine_basis_volumes(const supine_basis *basis, const supine_pose 
     supine_basis_contract(basis, lung, supine_basis_lung_weights(basis, pose, lung), &form);
     volumes_ml[lung] =
         basis->info.reference_volume[lung] + supine_volume_form_at(&form, pose->gains[lung]);
+    const double length = 1 + pose->expansion[lung];
+    volumes_ml[lung] *= length * length * length;
   }
   return SUPINE_OK;
 }

@@ -11,7 +11,7 @@ static class Deform
 {
     const string Library = "supine_runtime";
     const int StateSize = 112;                  // sizeof(supine_state)
-    const int PoseSize = 256 + 16 * 3 + 1;      // supine_pose in doubles: weights, gains, identity of the basis
+    const int PoseSize = 256 + 16 * 3 + 1 + 16; // supine_pose in doubles: weights, gains, identity, expansions
 
     [StructLayout(LayoutKind.Sequential)]
     struct SupineError

@@ -214,7 +214,7 @@ namespace Supine
         const int ModesMax = 256, LungsMax = 16;
         IntPtr handle;
         readonly int weights, lungs; // number of weights: one of each mode or, in fields over volume, of each lung and mode
-        readonly double[] pose = new double[ModesMax + 3 * LungsMax + 1]; // supine_pose: weights, gains, basis
+        readonly double[] pose = new double[ModesMax + 4 * LungsMax + 1]; // supine_pose: weights, gains, basis, expansions
 
         public Basis(string path)
         {

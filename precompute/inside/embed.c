@@ -190,7 +190,24 @@ static void surface_motion(const embedding *e, const supine_inside_shell *shell,
   }
 }
 
-/* Compute positions at full inflation: positions in the scan minus displacements to the scan.
+/* Return the factor on the lengths of a lung by which it has collapsed; 1 if it has not. */
+static double collapse_of(const embedding *e, size_t lung) {
+  return 1.0 / (1.0 + e->shells->scan.expansion[lung]);
+}
+
+/* Return a coordinate of a point of the scan in its lung as the modes move it: collapsed, if the
+ * basis holds it as collapsed. */
+static double collapse_point(const embedding *e, size_t lung, const double *point, size_t axis) {
+  const double *hilum = supine_basis_get_info(e->shells->basis)->hilum;
+  if (hilum == NULL) {
+    return point[axis];
+  }
+  const double fixed = hilum[3 * lung + axis];
+  return fixed + collapse_of(e, lung) * (point[axis] - fixed);
+}
+
+/* Compute positions at full inflation: positions in the scan, collapsed as in the basis, minus
+ * displacements to the scan.
  * @param values  [end - begin, e->columns] displacement by each mode, mm */
 static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
                            const double *values) {
@@ -203,7 +220,8 @@ static void points_to_full(embedding *e, size_t lung, size_t begin, size_t end,
       for (size_t k = 0; k < modes; ++k) {
         moved += e->shells->scan.gains[lung][axis] * weights[k] * row[k];
       }
-      e->vertices[3 * i + axis] = (float)(e->content->points[3 * e->order[i] + axis] - moved);
+      const double *point = e->content->points + 3 * e->order[i];
+      e->vertices[3 * i + axis] = (float)(collapse_point(e, lung, point, axis) - moved);
     }
   }
 }
@@ -331,10 +349,12 @@ static supine_status embed_lung(embedding *e, size_t lung, size_t begin, size_t 
 
 /* Find where a rigid part lies at full inflation, so that the mode weights and gains of the scan
  * move it to its scanned position. Iterate, because the rotation of the part by this movement
- * depends on the unknown position. */
+ * depends on the unknown position. A rigid part of a collapsed lung has moved to the hilum with it,
+ * but has not shrunk. */
 static void rigid_to_full(embedding *e, size_t begin, size_t end) {
   enum { TURNS = 60 };
   const double count = (double)(end - begin);
+  const double collapse = collapse_of(e, e->group[begin]);
   double given[3] = {0.0};
   double full[3] = {0.0};
   double r[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
@@ -353,7 +373,8 @@ static void rigid_to_full(embedding *e, size_t begin, size_t end) {
       }
       for (size_t k = 0; k < 9; ++k) {
         const size_t b = k % 3;
-        const double moved = scan[b] - given[b] - ((double)e->vertices[3 * i + b] - full[b]);
+        const double moved =
+            collapse * (scan[b] - given[b]) - ((double)e->vertices[3 * i + b] - full[b]);
         h[k / 3][b] += p[k / 3] * (p[b] + moved);
       }
       if (turn == TURNS) {

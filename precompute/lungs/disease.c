@@ -42,8 +42,7 @@ supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_le
   return SUPINE_OK;
 }
 
-/* Estimate the hilum: the mean of the vertices in the quarter of the lung nearest the midline. */
-static void find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) {
+void supine_lungs_find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) {
   const double *p = lungs->mesh.vertices;
   double low = INFINITY;
   double high = -INFINITY;
@@ -79,7 +78,7 @@ void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], dou
     }
     const double length = cbrt(share[lung]);
     double hilum[3];
-    find_hilum(lungs, lung, hilum);
+    supine_lungs_find_hilum(lungs, lung, hilum);
     for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
       for (size_t k = 0; k < 3; ++k) {
         vertices[3 * i + k] = hilum[k] + length * (vertices[3 * i + k] - hilum[k]);

@@ -41,6 +41,9 @@ supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_le
  * @param vertices  [N, 3] output, mm */
 void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
+/** Estimate the hilum of a lung, mm: the point about which supine_lungs_collapse shrinks it. */
+void supine_lungs_find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]);
+
 /** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place.
  * `share` is the volume of each lung divided by its healthy volume. */
 void supine_lungs_collapse_directions(const supine_lungs *lungs, const double share[2],

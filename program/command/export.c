@@ -91,6 +91,18 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
   return SUPINE_OK;
 }
 
+/* Return whether a state is the scan of a lung that the basis holds as collapsed. The page moves
+ * the lungs by modes alone, so that it cannot show this state. */
+static bool is_before_collapse(const supine_basis *basis,
+                               const supine_options_reference_pose *state) {
+  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
+    if (state->pose.expansion[lung] != 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Find the states from which the page measures displacements: that of --from or its default, the
  * scan, and supine at rest, each once. */
 static supine_status find_references(const supine_basis *basis, const supine_from *from,
@@ -100,7 +112,10 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
   for (size_t i = 0; i < 3; ++i) {
     SUPINE_TRY(
         supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[*count], error));
-    bool again = false;
+    bool again = is_before_collapse(basis, &found[*count]);
+    SUPINE_REFUSE_IF(again && from->given && i == 0, error, SUPINE_ERROR_UNSUPPORTED,
+                     "--from: a page cannot show lungs before their collapse, as in the scan: give "
+                     "another state, such as supine:rest");
     for (size_t j = 0; j < *count; ++j) {
       again = again || strcmp(found[j].name, found[*count].name) == 0;
     }

@@ -173,6 +173,11 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
   SUPINE_REFUSE_IF(
       wanted->has_breath && !breathes, error, SUPINE_ERROR_ARGUMENT,
       "the basis was made with --fields and has no breaths: leave out --tidal, --rate and --pv");
+  SUPINE_REFUSE_IF(wanted->has_volume && info->hilum != NULL && wanted->volume.lung_count == 0 &&
+                       wanted->volume.volume.kind == SUPINE_VOLUME_SCAN &&
+                       wanted->volume.volume.ml == 0.0,
+                   error, SUPINE_ERROR_UNSUPPORTED,
+                   "--volume scan: that is the lungs before their collapse: give another volume");
   if (info->is_fields && (wanted->has_volume || !breathes)) {
     supine_pose pose;
     volume->fixed = wanted->volume;

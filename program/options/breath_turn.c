@@ -64,7 +64,19 @@ supine_status supine_options_turn_read(const char *text, void *turn, supine_erro
 
 supine_state supine_options_breath_state(const supine_basis *basis, const double gravity[3],
                                          double ml) {
-  const bool known = supine_basis_get_info(basis)->has_rest;
-  return (supine_state){.gravity = {gravity[0], gravity[1], gravity[2]},
-                        .volume = {known ? SUPINE_VOLUME_REST : SUPINE_VOLUME_SCAN, ml}};
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]},
+                        .volume = {SUPINE_VOLUME_REST, ml}};
+  if (!info->has_rest) {
+    state.volume.kind = SUPINE_VOLUME_SCAN;
+  }
+  if (!info->has_rest && info->hilum != NULL) {
+    /* The state `scan` has the lungs before their collapse; the reference surface has its volume.
+     */
+    state.volume.kind = SUPINE_VOLUME_ABSOLUTE;
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      state.volume.ml += info->reference_volume[lung];
+    }
+  }
+  return state;
 }

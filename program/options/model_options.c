@@ -238,7 +238,8 @@ const supine_option supine_options_model[] = {
      .read = read_lesion, .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
-     "volume in every state. The other lung takes the rest of each breath",
+     "volume in every state but the scan, which stays as it was scanned. The lung shrinks towards "
+     "its hilum. The other lung takes the rest of each breath",
      .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {.name = NULL}};
 

@@ -188,12 +188,41 @@ static double displacement(const supine_basis *basis, const double *q, size_t i)
   return supine_length(u);
 }
 
+/* Write the distances of a lung's vertices between two poses, of which at least one expands a lung.
+ * @param from  NULL for the reference surface */
+static void expanded_distances(const supine_basis *basis, const supine_pose *pose,
+                               const supine_pose *from, float *distance) {
+  enum { BLOCK = 256 };
+  float x[3 * BLOCK];
+  float origin[3 * BLOCK] = {0};
+  for (size_t begin = 0; begin < basis->info.vertex_count; begin += BLOCK) {
+    const size_t left = basis->info.vertex_count - begin;
+    const size_t count = left < BLOCK ? left : BLOCK;
+    (void)supine_displace_range(basis, pose, begin, begin + count, x);
+    if (from != NULL) {
+      (void)supine_displace_range(basis, from, begin, begin + count, origin);
+    }
+    for (size_t i = 0; i < count; ++i) {
+      double u[3];
+      for (size_t axis = 0; axis < 3; ++axis) {
+        u[axis] = (double)x[3 * i + axis] - (double)origin[3 * i + axis];
+      }
+      distance[begin + i] = (float)supine_length(u);
+    }
+  }
+}
+
 supine_status supine_compare_distances(const supine_compare *compare, const supine_pose *pose,
                                        const supine_pose *from, float *distance) {
   const supine_basis *basis = compare->basis;
   double q[3 * SUPINE_LUNGS_MAX * SUPINE_MODES_MAX];
   if (!products_of(compare, pose, from, q)) {
     return SUPINE_ERROR_ARGUMENT;
+  }
+  if (supine_basis_expansion(basis, pose) > 0 ||
+      (from != NULL && supine_basis_expansion(basis, from) > 0)) {
+    expanded_distances(basis, pose, from, distance);
+    return SUPINE_OK;
   }
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     for (size_t i = basis->lung_begin[lung]; i < basis->lung_begin[lung + 1]; ++i) {

@@ -3,7 +3,7 @@
 // memory never grows and the arrays never move.
 
 // Bytes reserved for C structs and buffers.
-const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE, OPTIONS = 16;
+const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1 + 16), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE, OPTIONS = 16;
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
 const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.

@@ -132,6 +132,8 @@ def full_breath(p, exp, insp):
     """Yield the path, the constant that was used, and what 'judge' returns, for each path of a full breath."""
     made = [p.run("precompute", scan, "--edge", 6, "--held-out", 20, "-o", "b.safetensors") for scan in (exp, insp)]
     volume = [sum(float(ml) for ml in re.findall(r"vertices: ([0-9.]+) mL", text)) for text in made]
+    p.basis(insp, p.inhaled, "--resting", f"supine={volume[0]:.0f}mL")
+    yield "law, hilum, rest given", 4.5, *relative(p, "rest")
     p.basis(insp, p.inhaled)
     yield "law", 4.5, *judge(*p.deform(f"{volume[0]:.0f}mL"), p.exhaled)
     yield "law, relative to the hilum", 4.5, *relative(p, f"{volume[0]:.0f}mL")

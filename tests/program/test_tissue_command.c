@@ -4,7 +4,10 @@
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "program/command/list.h"
+#include "program/options/breath_turn.h"
 #include "tests/helpers/test.h"
+#include <supine/compare.h>
+#include <supine/locate.h>
 #include <supine/runtime.h>
 
 #include "tests/helpers/command_helpers.h"
@@ -225,6 +228,265 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
   /* The right lung gains over 50 mL more if the left lung is collapsed. */
   assert_true(volumes[1][1] > volumes[0][1] + 50.0);
   assert_true(volumes[1][0] < 0.6 * volumes[0][0]);
+}
+
+enum { INSIDE = 5 }; /* points inside the lungs, of which the first three are in the left lung */
+
+/* Write points within 20 mm of the middle of each lung to the CSV file, three in the left lung. */
+static void write_points_inside(double given[INSIDE][3]) {
+  static const double aside[INSIDE][3] = {
+      {0.0, 0.0, 0.0}, {7.0, -11.0, 13.0}, {-6.0, 12.0, -17.0}, {0.0, 0.0, 0.0}, {3.0, 15.0, 11.0}};
+  supine_mesh mesh = {0};
+  double middle[2][3] = {{0.0}};
+  assert_int_equal(supine_mesh_load(lungs, NULL, &mesh, NULL, NULL), SUPINE_OK);
+  const size_t half = mesh.vertex_count / 2; /* both lungs have equally many vertices */
+  for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+    middle[i / 3 / half][i % 3] += mesh.vertices[i] / (double)half;
+  }
+  supine_mesh_free(&mesh);
+  FILE *file = fopen(csv, "w");
+  assert_non_null(file);
+  (void)fputs("x,y,z\n", file);
+  for (size_t i = 0; i < INSIDE; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      given[i][k] = middle[i / 3][k] + aside[i][k];
+    }
+    (void)fprintf(file, "%.9g,%.9g,%.9g\n", given[i][0], given[i][1], given[i][2]);
+  }
+  (void)fclose(file);
+}
+
+/* Make a basis of lungs at rest, of which the left one has kept a share of its volume, and a basis
+ * of points inside them. */
+static void make_collapsed(const char *share, const char *inside, supine_basis *bases[2]) {
+  supine_error error = {0};
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--scanned", "supine:rest", "--lung", share),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(COMMAND_RUN(&supine_command_embed, KEPT_ERR, text, other, csv, "-o", inside),
+                   SUPINE_EXIT_OK);
+  if (supine_basis_open(other, &bases[0], &error) != SUPINE_OK ||
+      supine_basis_open(inside, &bases[1], &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+}
+
+/* Return the error of storage of a basis in a posture and volume, mm. */
+static double error_at(const supine_basis *basis, const char *named) {
+  supine_state state;
+  supine_pose pose;
+  assert_int_equal(supine_state_parse(named, &state, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, NULL), SUPINE_OK);
+  return supine_basis_error(basis, &pose);
+}
+
+/* Compute the positions of a basis in a posture and volume, and the volumes of its lungs. */
+static float *positions_at(const supine_basis *basis, const char *named, double volumes[2]) {
+  supine_state state;
+  supine_pose pose;
+  float *xyz = malloc(3 * supine_basis_get_info(basis)->vertex_count * sizeof *xyz);
+  assert_non_null(xyz);
+  assert_int_equal(supine_state_parse(named, &state, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, NULL), SUPINE_OK);
+  assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+  if (volumes != NULL) {
+    assert_int_equal(supine_basis_volumes(basis, &pose, volumes), SUPINE_OK);
+  }
+  return xyz;
+}
+
+/* Check that collapsed positions are those of healthy lungs, shrunk about the hilum in the left
+ * one.
+ * @param length  factor on the lengths of the left lung
+ * @param beyond  largest distance, mm, beyond the errors of storage that the bases state */
+static void check_shrunk(const supine_basis *healthy, const supine_basis *ill, const char *named,
+                         double length, double beyond) {
+  const supine_basis_info *info = supine_basis_get_info(ill);
+  float *x[2] = {positions_at(healthy, named, NULL), positions_at(ill, named, NULL)};
+  const double error = error_at(healthy, named) + error_at(ill, named) + beyond;
+  assert_true(error < 0.02 + beyond);
+  for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
+    const bool left = i < 3 * info->lung_begin[1];
+    const double hilum = info->hilum[i % 3];
+    const double expected = left ? hilum + length * ((double)x[0][i] - hilum) : (double)x[0][i];
+    assert_close((double)x[1][i], expected, error);
+  }
+  free(x[0]);
+  free(x[1]);
+}
+
+/* The state `scan` has the lungs, and points inside them, where they were scanned; other states
+ * have them collapsed, so that the displacement from the scan is the collapse. */
+TEST(test_precompute_collapsed_lung_scan_is_before_collapse) {
+  double given[INSIDE][3];
+  const double length = cbrt(0.5);
+  supine_basis *healthy[2];
+  supine_basis *ill[2];
+  char inside[80];
+  (void)snprintf(inside, sizeof inside, "%s.inside", other);
+  write_points_inside(given);
+  make_collapsed("left:1", inside, healthy);
+  make_collapsed("left:0.5", inside, ill);
+  double volumes[4][2];
+  free(positions_at(healthy[0], "supine:scan", volumes[0]));
+  free(positions_at(ill[0], "supine:scan", volumes[1]));
+  free(positions_at(healthy[0], "supine:rest", volumes[2]));
+  free(positions_at(ill[0], "supine:rest", volumes[3]));
+  assert_close(volumes[1][0], volumes[0][0], 0.05);
+  assert_close(volumes[3][0], 0.5 * volumes[2][0], 0.05);
+  assert_close(volumes[3][1], volumes[2][1], 0.05);
+  check_shrunk(healthy[0], ill[0], "supine:scan", 1.0, 0.0);
+  check_shrunk(healthy[0], ill[0], "supine:rest", length, 0.0);
+  check_shrunk(healthy[1], ill[1], "supine:scan", 1.0, 0.0);
+  check_shrunk(healthy[1], ill[1], "supine:rest", length, 0.05);
+  float *placed = positions_at(ill[1], "supine:scan", NULL);
+  for (size_t i = 0; i < 3 * INSIDE; ++i) { /* the file keeps the order within a lung */
+    assert_close((double)placed[i], given[i / 3][i % 3], error_at(ill[1], "supine:scan"));
+  }
+  free(placed);
+  for (size_t i = 0; i < 2; ++i) {
+    supine_basis_close(healthy[i]);
+    supine_basis_close(ill[i]);
+  }
+  (void)unlink(inside);
+}
+
+/* Distances, expected errors and shaders with a pose of the scan before a collapse. */
+TEST(test_collapsed_lung_scan_pose_compared_and_refused_by_shader) {
+  supine_basis *basis = NULL;
+  supine_compare *compare = NULL;
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--scanned", "supine:rest", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(supine_basis_open(other, &basis, NULL), SUPINE_OK);
+  assert_int_equal(supine_compare_create(basis, &compare, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const size_t n = info->vertex_count;
+  const supine_state rest = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
+  supine_pose scan;
+  supine_pose now;
+  assert_int_equal(supine_basis_scan_pose(basis, &scan, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_pose(basis, &rest, &now, NULL), SUPINE_OK);
+  assert_true(scan.expansion[0] > 0.25 && scan.expansion[0] < 0.27); /* 2^(1/3) - 1 */
+  assert_true(scan.expansion[1] == 0.0 && now.expansion[0] == 0.0);
+  float *distance = malloc(n * sizeof *distance);
+  float *sigma = malloc(n * sizeof *sigma);
+  float *x[2] = {positions_at(basis, "supine:scan", NULL),
+                 positions_at(basis, "supine:rest", NULL)};
+  assert_int_equal(supine_compare_distances(compare, &now, &scan, distance), SUPINE_OK);
+  assert_int_equal(supine_expected_error(basis, &rest, NULL, sigma, NULL), SUPINE_OK);
+  double farthest = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    double square = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double u = (double)x[1][3 * i + k] - (double)x[0][3 * i + k];
+      square += u * u;
+    }
+    farthest = fmax(farthest, sqrt(square));
+    assert_close((double)distance[i], sqrt(square), 1e-3);
+    assert_close((double)sigma[i], sqrt(SUPINE_EXPECTED_ERROR_MM * sqrt(square)), 0.2);
+  }
+  assert_true(farthest > 20.0);
+  float weights[SUPINE_GL_MODES];
+  float gains[6];
+  assert_int_equal(supine_gl_weights(basis, &scan, weights, gains), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_weights(basis, &now, weights, gains), SUPINE_OK);
+  free(distance);
+  free(sigma);
+  free(x[0]);
+  free(x[1]);
+  supine_compare_destroy(compare);
+  supine_basis_close(basis);
+}
+
+/* Write a tetrahedron with edges of 14 mm around a point in the left lung. */
+static void write_tumour(const char *path, double corners[4][3]) {
+  double given[INSIDE][3];
+  uint32_t faces[12] = {0, 1, 2, 0, 3, 1, 0, 2, 3, 1, 3, 2};
+  supine_mesh mesh = {4, corners[0], 4, faces};
+  write_points_inside(given);
+  for (size_t i = 0; i < 4; ++i) {
+    for (size_t k = 0; k < 3; ++k) {
+      corners[i][k] = given[1][k] + (i == 0 || i == k + 1 ? 5.0 : -5.0);
+    }
+  }
+  assert_int_equal(supine_mesh_save(path, &mesh, NULL, NULL), SUPINE_OK);
+}
+
+/* A rigid tumour moves to the hilum with its collapsed lung, but keeps its size. In the scan, it is
+ * where it was scanned. */
+TEST(test_collapsed_lung_rigid_tumour_keeps_size) {
+  double corners[4][3];
+  char tumour[80];
+  char inside[80];
+  (void)snprintf(tumour, sizeof tumour, "%s.ply", other);
+  (void)snprintf(inside, sizeof inside, "%s.inside", other);
+  write_tumour(tumour, corners);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--scanned", "supine:rest", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(COMMAND_RUN(&supine_command_embed, KEPT_ERR, text, other, tumour, "--rigid",
+                               "all", "-o", inside),
+                   SUPINE_EXIT_OK);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open(inside, &basis, NULL), SUPINE_OK);
+  float *scan = positions_at(basis, "supine:scan", NULL);
+  float *now = positions_at(basis, "prone:rest", NULL);
+  double moved = 0.0;
+  for (size_t i = 0; i < 4; ++i) {
+    double square = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      assert_close((double)scan[3 * i + k], corners[i][k], 1e-3);
+      const double edge = (double)now[3 * i + k] - (double)now[3 * ((i + 1) % 4) + k];
+      square += edge * edge;
+    }
+    moved = fmax(moved, fabs((double)now[3 * i] - corners[i][0]));
+    assert_close(sqrt(square), 10.0 * sqrt(2.0), 1e-3);
+  }
+  assert_true(moved > 3.0);
+  free(scan);
+  free(now);
+  supine_basis_close(basis);
+  (void)unlink(tumour);
+  (void)unlink(inside);
+}
+
+/* What moves lungs by modes alone has no scan before the collapse. */
+TEST(test_collapsed_lung_scan_refused_by_page_and_stream) {
+  char page[80];
+  (void)snprintf(page, sizeof page, "%s.html", other);
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  assert_int_equal(
+      COMMAND_RUN(&supine_command_export, KEPT_ERR, text, other, "--from", "scan", "-o", page),
+      SUPINE_EXIT_UNSUPPORTED);
+  assert_says(text, "before their collapse");
+  assert_int_equal(COMMAND_RUN(&supine_command_stream, KEPT_ERR, text, other, "--volume", "scan"),
+                   SUPINE_EXIT_UNSUPPORTED);
+  assert_says(text, "before their collapse");
+  assert_int_equal(COMMAND_RUN(&supine_command_export, KEPT_ERR, text, other, "-o", page),
+                   SUPINE_EXIT_OK);
+  (void)unlink(page);
+}
+
+/* A breath begins in the collapsed lung, also if its volume counts from the scan. */
+TEST(test_breath_of_collapsed_lung_without_rest_begins_collapsed) {
+  assert_int_equal(COMMAND_RUN(&supine_command_precompute, KEPT_ERR, text, lungs, "-o", other,
+                               "--band", "5", "--law", "paper", "--lung", "left:0.5"),
+                   SUPINE_EXIT_OK);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open(other, &basis, NULL), SUPINE_OK);
+  static const double gravity[3] = {0.0, 1.0, 0.0};
+  const supine_state begin = supine_options_breath_state(basis, gravity, 0.0);
+  supine_pose pose;
+  double volumes[2];
+  assert_int_equal(supine_basis_pose(basis, &begin, &pose, NULL), SUPINE_OK);
+  assert_int_equal(supine_basis_volumes(basis, &pose, volumes), SUPINE_OK);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    assert_close(volumes[lung], supine_basis_get_info(basis)->reference_volume[lung], 1e-3);
+  }
+  supine_basis_close(basis);
 }
 
 TEST(test_solve_missing_lung_refused) {

@@ -240,7 +240,7 @@ TEST(test_open_wrong_content_refused_with_reason) {
 typedef struct parts {
   supine_tensor tensors[10];
   size_t tensor_count;
-  supine_metadata metadata[4];
+  supine_metadata metadata[5];
   size_t metadata_count;
   const char *message; /* text that the error message must contain; NULL: the path */
 } parts;
@@ -362,6 +362,8 @@ TEST(test_open_implausible_metadata_refused) {
       {"resting_spread", "1e300"},
       {"bend", "0,1e9,0"},
       {"bend", "0,inf,0"},
+      {"lung_hilum_mm", "1,2"},
+      {"lung_hilum_mm", "1,2,1e9"},
   };
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
     parts p = sound();
@@ -370,6 +372,18 @@ TEST(test_open_implausible_metadata_refused) {
     p.metadata[p.metadata_count++] = (supine_metadata){wrong[i][0], wrong[i][1]};
     p.message = strcmp(wrong[i][0], "midline_mm") == 0 ? "midline" : wrong[i][0];
     assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
+  }
+}
+
+TEST(test_open_implausible_collapse_refused) {
+  static const char *const expansions[] = {"-0.5", "101", "nan", "0.5,0.5", "0.26"};
+  for (size_t i = 0; i < sizeof expansions / sizeof *expansions; ++i) {
+    parts p = sound();
+    p.metadata[p.metadata_count++] = (supine_metadata){"lung_expansion", expansions[i]};
+    p.metadata[p.metadata_count++] = (supine_metadata){"lung_hilum_mm", "10,20,30"};
+    p.message = "lung_expansion";
+    const bool good = i + 1 == sizeof expansions / sizeof *expansions;
+    assert_int_equal(open_parts(&p), good ? SUPINE_OK : SUPINE_ERROR_FORMAT);
   }
 }
 

@@ -259,7 +259,8 @@ static json_t *describe_inside(const page *p) {
 }
 
 /* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose
- * of the scan cannot be computed. */
+ * of the scan cannot be computed. Of collapsed lungs it is that of the collapsed lung at the
+ * inflation of the scan, as the page moves lungs by modes alone. */
 static double scan_volume(const page *p) {
   const supine_state scan = supine_basis_scan(p->basis);
   double held[SUPINE_LUNGS_MAX];
@@ -269,6 +270,7 @@ static double scan_volume(const page *p) {
   if (supine_basis_pose(p->basis, &scan, &pose, &error) != SUPINE_OK) {
     return 0;
   }
+  memset(pose.expansion, 0, sizeof pose.expansion);
   (void)supine_basis_volumes(p->basis, &pose, held);
   for (size_t lung = 0; lung < p->info->lung_count; ++lung) {
     beyond += held[lung] - p->info->reference_volume[lung];

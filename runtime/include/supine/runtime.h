@@ -156,6 +156,9 @@ typedef struct supine_basis_info {
    * two vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
    * a_1 P_1. NULL if there are no clusters. */
   const float *cluster_vectors;
+  /** [lung_count, 3] hilum, mm, about which a collapsed lung has shrunk (supine_basis_scan), or
+   * NULL if no lung of the file is collapsed. */
+  const double *hilum;
 } supine_basis_info;
 
 /** The weights of modes and the gains of a state (supine_basis_pose). All zeros mean the reference
@@ -169,6 +172,9 @@ typedef struct supine_pose {
    * is not checked: a program may set the weights of a pose itself. Weights and gains must be
    * finite and below 2^20; otherwise the status is SUPINE_ERROR_ARGUMENT too. */
   uint64_t basis;
+  /** [lung_count] The deformed lung is stretched about its hilum by 1 + expansion. It is 0 but in
+   * the scan of a lung that the file holds as collapsed (supine_basis_scan_pose). */
+  double expansion[SUPINE_LUNGS_MAX];
 } supine_pose;
 
 /** Open a basis from a file. Check all of it, and pack it for evaluation. Cost: a few passes over
@@ -283,11 +289,18 @@ SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const sup
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
 /** Multiply the displacements of a pose by `gain`: set its gains for all lungs and axes to this
- * number. Use this where the gains do not follow from a volume: for open surfaces, or for
- * displacements from another simulator, which a gain of 1 reproduces. */
+ * number, and its expansions to 0. Use this where the gains do not follow from a volume: for open
+ * surfaces, or for displacements from another simulator, which a gain of 1 reproduces. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
-/** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN. */
+/** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN.
+ *
+ * A lung that the file holds as collapsed, with a share c of its volume (metadata `lung_share`), is
+ * collapsed in all states but this one, which is the scan itself: there, its vertices lie at
+ * h + (1 + e) (x - h), e = c^(-1/3) - 1 (metadata `lung_expansion`), where x is their position in
+ * the collapsed lung at the inflation of the scan, and h the hilum (metadata `lung_hilum_mm`). Any
+ * other volume relative to the scan is added to that of the lung that is collapsed at the inflation
+ * of the scan. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
 
 /** Compute the pose of the lungs as they are in the scan. For displacements from another simulator
@@ -438,7 +451,8 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
  * @param weights  [4 ceil(mode_count / 4)], written; [lung_count, 4 ceil(mode_count / 4)] if
  *                 supine_basis_info.order is above 0, which needs SUPINE_BY_LUNG in supine.glsl
  * @param gains    [lung_count, 3], written
- * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack */
+ * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack; or supine_pose.expansion is not 0, which the
+ *                                   shader lacks */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 

@@ -86,7 +86,8 @@ class State(ctypes.Structure):
 
 class CPose(ctypes.Structure):
     """The C struct supine_pose."""
-    _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX), ("basis", c_uint64)]
+    _fields_ = [("weights", c_double * MODES_MAX), ("gains", c_double * 3 * LUNGS_MAX), ("basis", c_uint64),
+                ("expansion", c_double * LUNGS_MAX)]
 
 
 class GivenPose:
@@ -117,7 +118,7 @@ class Info(ctypes.Structure):
                 ("normal_weights", c_void_p), ("reference_volume", c_void_p), ("has_rest", c_bool),
                 ("has_full", c_bool), ("is_fields", c_bool), ("bend", c_double * 3),
                 ("identity", c_uint64), ("order", c_size_t), ("cluster_count", c_size_t), ("cluster", c_void_p),
-                ("cluster_scalars", c_void_p), ("cluster_vectors", c_void_p)]
+                ("cluster_scalars", c_void_p), ("cluster_vectors", c_void_p), ("hilum", POINTER(c_double))]
 
 
 class Tensor(ctypes.Structure):
