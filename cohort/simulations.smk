@@ -2,7 +2,7 @@
 # Run a plan of simulations of one pair of lungs as jobs, and collect the displacements into one file for
 # 'supine precompute --fields':
 #
-#     supine precompute --directions 32 --volumes 4 >plan.csv
+#     supine precompute --directions 24 --volumes 6 >plan.csv
 #     snakemake -s cohort/simulations.smk --cores 2 --config plan=plan.csv points=points.csv inputs=lung.inp \
 #       simulate='python3 cohort/calculix.py lung.inp'
 #

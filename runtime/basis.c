@@ -461,6 +461,10 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
       !basis->info.has_volume) {
     return refuse(c, "the simulated volumes have no range, or the surface has no volume");
   }
+  if (supine_safetensors_metadata(c->file, "scan_gravity") != NULL &&
+      supine_simulated_find_offsets(basis, s->offset) != SUPINE_OK) {
+    return refuse(c, "metadata 'scan_gravity' is not a direction");
+  }
   return supine_simulated_find_default(basis, &s->usual);
 }
 

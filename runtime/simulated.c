@@ -65,29 +65,51 @@ static void keep_within(size_t count, const double (*limits)[2], double total, d
   }
 }
 
-/* Divide a total volume among the lungs as the simulator did.
+/* Compute what the fit of the simulated volumes gives each lung of a total.
+ * @param total    mL above the reference surfaces
+ * @param volumes  [lungs] mL above the reference surface of each lung, written; they add up to the
+ *   total if that was simulated */
+static supine_status fitted_shares(const supine_basis *basis, const double gravity[3], double total,
+                                   double *volumes) {
+  const supine_simulated *s = &basis->simulated;
+  double products[RESTING_TERMS * (SUPINE_SH_ORDER_MAX + 1)];
+  const size_t terms = RESTING_TERMS * s->share_count;
+  const double t = fmin(fmax(map_to_unit(total, s->total), -1), 1);
+  SUPINE_TRY(supine_sh_evaluate_products(2, s->share_count - 1, gravity, t, products));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    volumes[lung] = 0;
+    for (size_t i = 0; i < terms; ++i) {
+      volumes[lung] += s->shares[lung * terms + i] * products[i];
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_simulated_find_offsets(const supine_basis *basis, double *offsets) {
+  SUPINE_TRY(fitted_shares(basis, basis->scan_gravity, 0, offsets));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    offsets[lung] = -offsets[lung];
+  }
+  return SUPINE_OK;
+}
+
+/* Divide a total volume among the lungs as the simulator did. In the posture of the scan and at its
+ * total volume, each lung has its own volume in the scan.
  * @param total    mL above the reference surfaces
  * @param volumes  [lungs] mL above the reference surface of each lung, written; they add up to the
  *   total */
 static supine_status share_out(const supine_basis *basis, const double gravity[3], double total,
                                double *volumes, supine_error *error) {
-  const supine_simulated *s = &basis->simulated;
   const size_t lungs = basis->info.lung_count;
   double limits[SUPINE_LUNGS_MAX][2];
-  double products[RESTING_TERMS * (SUPINE_SH_ORDER_MAX + 1)];
   double range[3] = {0, 0, 0}; /* lowest and highest total, and the reference volume of all lungs */
-  const size_t terms = RESTING_TERMS * s->share_count;
-  const double t = fmin(fmax(map_to_unit(total, s->total), -1), 1);
   SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
-  SUPINE_TRY(supine_sh_evaluate_products(2, s->share_count - 1, gravity, t, products));
+  SUPINE_TRY(fitted_shares(basis, gravity, total, volumes));
   for (size_t lung = 0; lung < lungs; ++lung) {
     range[0] += limits[lung][0];
     range[1] += limits[lung][1];
     range[2] += basis->info.reference_volume[lung];
-    volumes[lung] = 0;
-    for (size_t i = 0; i < terms; ++i) {
-      volumes[lung] += s->shares[lung * terms + i] * products[i];
-    }
+    volumes[lung] += basis->simulated.offset[lung];
   }
   if (is_outside(total, range[0], range[1])) {
     return refuse_volume(NULL, range[2] + total, range[2] + range[0], range[2] + range[1], error);
@@ -284,6 +306,8 @@ supine_status supine_simulated_find_default(const supine_basis *basis, supine_vo
   return SUPINE_OK;
 }
 
+/* Find the volumes of a state. Those of a state of all lungs depend on their total alone, whatever
+ * it is relative to: otherwise the lungs would jump between scan and scan+0.01, or at rest. */
 static supine_status find_volumes(const supine_basis *basis, const supine_state *state,
                                   double *volumes, supine_error *error) {
   supine_volume asked = state->volume;
@@ -294,9 +318,6 @@ static supine_status find_volumes(const supine_basis *basis, const supine_state 
     asked = basis->simulated.usual;
   }
   SUPINE_TRY(find_origin(basis, state->gravity, asked.kind, volumes, error));
-  if (asked.ml == 0 && asked.kind != SUPINE_VOLUME_ABSOLUTE) {
-    return SUPINE_OK; /* the volumes of all lungs are known */
-  }
   double total = asked.ml;
   for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
     total += volumes[lung];

@@ -19,6 +19,12 @@
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]);
 
+/** Find what is added to the fitted volume of each lung so that the lungs hold their own volumes in
+ * the scan, in its posture, where the fit gives nearly these (supine_simulated.offset).
+ * @param offsets  [lungs] mL, written
+ * @retval SUPINE_ERROR_ARGUMENT  the gravity in the scan is zero or not finite */
+supine_status supine_simulated_find_offsets(const supine_basis *basis, double *offsets);
+
 /** Find the volume of states without one: rest, if it is known; else that of the scan, if all lungs
  * can hold it in 26 directions of gravity; else, rounded to 1 mL, the middle of the total volumes
  * that were simulated in all of them. */

@@ -78,8 +78,8 @@ function phantomPoints(path, vertices) {
 }
 
 /** Write a basis of fields over gravity and volume of a phantom with about `vertices` vertices. The right lung opens later
- * than the left lung. `storage` is modes or clusters. */
-export function breathingFieldsBasis(path, vertices, storage) {
+ * than the left lung. `storage` is modes or clusters; `options` are further ones of precompute. */
+export function breathingFieldsBasis(path, vertices, storage, ...options) {
   const [mesh, fields] = ['breathing.obj', 'breathing-fields.safetensors'].map((name) => join(folder, name));
   const { points, left } = phantomPoints(mesh, vertices);
   const centres = [false, true].map((side) => [0, 1, 2].map((axis) => {
@@ -95,7 +95,7 @@ export function breathingFieldsBasis(path, vertices, storage) {
   const directions = supine('precompute', '--directions', '20').trim().split('\n').slice(1).map((line) => line.split(',').map(Number));
   const runs = [0, 1 / 3, 2 / 3, 1].flatMap((s) => directions.map((g) => [g, s]));
   writeTensors(fields, { points: [[points.length, 3], points.flat()], gravity: [[runs.length, 3], runs.flatMap(([g]) => g)], displacement: [[runs.length, points.length, 3], runs.flatMap(([g, s]) => move(g, s).flat())] });
-  supine('precompute', mesh, '--fields', fields, '--modes', '16', '--storage', storage, '-o', path);
+  supine('precompute', mesh, '--fields', fields, '--modes', '16', '--storage', storage, ...options, '-o', path);
 }
 
 /** Write a basis of smooth fields, as another simulator may compute them, of a phantom with about `vertices` vertices. It

@@ -414,7 +414,7 @@ void fixture_write(const fixture *f, const char *path) {
     add_normals(f, &t);
   }
   (void)snprintf(total, sizeof total, "%.17g,%.17g", f->total[0], f->total[1]);
-  supine_metadata metadata[7] = {
+  supine_metadata metadata[8] = {
       {"format", "supine-basis"},
       {"version", "4"},
       {"kind", f->vector ? "vector" : "scalar"},
@@ -427,6 +427,9 @@ void fixture_write(const fixture *f, const char *path) {
   }
   if (f->bend != NULL) {
     metadata[metadata_count++] = (supine_metadata){"bend", f->bend};
+  }
+  if (f->scan_gravity != NULL) {
+    metadata[metadata_count++] = (supine_metadata){"scan_gravity", f->scan_gravity};
   }
   supine_error error = {0};
   const supine_status status =

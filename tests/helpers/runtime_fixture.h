@@ -26,7 +26,8 @@ typedef struct fixture {
   /* [lungs, 9] harmonic coefficients, mL, of the volume at rest as a function of gravity, or NULL
    */
   const double *resting;
-  const char *bend; /* metadata "bend", or NULL */
+  const char *bend;         /* metadata "bend", or NULL */
+  const char *scan_gravity; /* metadata "scan_gravity", or NULL */
   bool fields;     /* whether the metadata says that another simulator computed the displacements */
   size_t normals;  /* number of modes from which normals are computed, set by fixture_add_normals */
   int16_t *normal; /* [vertices, 3, normals] coefficients of vertex normals, as integers. They are

@@ -56,6 +56,15 @@ for (const cut of [0, 7, 1000, bytes.length - 1]) {
   await assert.rejects(open(bytes.subarray(0, cut)), (error) => error instanceof SupineError && error.status === 'format', `${cut} bytes`);
 }
 
+/* The lungs of a simulator do not jump where a volume begins to differ from that of the scan. */
+for (const path of breathing) {
+  const moving = await open(readFileSync(path));
+  for (const posture of ['supine', 'prone', 'left']) {
+    const [at, near] = [`${posture}:scan`, `${posture}:scan+0.01`].map((state) => moving.pose(state).deform().slice());
+    assert.ok(largestDistance(at, near) < 0.005, posture);
+  }
+}
+
 /* Lungs, triangles, metadata and tensors of the file can be read. */
 assert.deepEqual(Object.keys(lungs.lungs), ['left', 'right']);
 assert.deepEqual(Object.values(lungs.lungs).flat(), [0, lungs.lungs.right[0], lungs.lungs.right[0], lungs.vertexCount]);

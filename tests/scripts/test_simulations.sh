@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Run a plan of simulations by a small program in place of a simulator, collect the fields, and make a basis of them:
 #
-#     test_simulations.sh PROGRAM COHORT
+#     test_simulations.sh PROGRAM COHORT [OPTIONS OF SNAKEMAKE]
 #
-# With snakemake, as jobs; one of them fails at first. Without it, the same commands one by one.
+# With snakemake, as jobs; one of them fails at first. Without it, the same commands one by one. The default options are
+# --cores 2. On a cluster, use --slurm --jobs 2.
 set -u
 supine=$1
 cohort=$2
+shift 2
+[ $# -gt 0 ] || set -- --cores 2
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -29,13 +32,13 @@ awk -F, -v x="$1" -v y="$2" -v z="$3" -v fill="$4" '{
 SIMULATE
 if command -v snakemake >/dev/null; then
   flow() {
-    snakemake -s "$cohort/simulations.smk" --cores 2 --nocolor --keep-going --config plan=plan.csv points=points.csv \
+    snakemake -s "$cohort/simulations.smk" --nocolor --keep-going "$@" --config plan=plan.csv points=points.csv \
       inputs=simulate.sh simulate='sh simulate.sh' >said 2>&1
   }
-  flow && fail "a failed simulation is not told"
+  flow "$@" && fail "a failed simulation is not told"
   [ "$(ls runs | wc -l)" -eq 24 ] || fail "a failed simulation stops others: $(ls runs | wc -l)"
   touch ready
-  flow || fail "the second run: $(tail -5 said)"
+  flow "$@" || fail "the second run: $(tail -5 said)"
   grep -q '^simulate *12' said || fail "simulations were computed again: $(grep -A6 '^job' said)"
 else
   touch ready

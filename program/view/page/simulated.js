@@ -7,10 +7,14 @@
 const CLOSE_ENOUGH = 1e-6; // difference between the volumes asked and held that ends the search, mL
 const BEYOND = 0.1;        // how far outside the simulated range of t the search may go
 
-/** Read the ranges and shares of the lungs' volumes from the page. */
-function takeSimulated(basis) {
+/** Read the ranges and shares of the lungs' volumes from the page. `offsets` are added to the shares of the lungs, so that
+ * each has its own volume in the scan in its posture, if this is known. */
+function takeSimulated({ metadata, lungs }) {
   const [range, limits, shares] = ['range', 'limits', 'shares'].map((name) => takeTensor(`simulated_${name}`, Float64Array));
-  return { range, limits, shares, total: basis.metadata.simulated_total_ml.split(',').map(Number) };
+  const simulated = { range, limits, shares, total: metadata.simulated_total_ml.split(',').map(Number) };
+  const scan = metadata.scan_gravity?.split(',').map(Number);
+  const fitted = scan ? fittedShares({ simulated, lungs }, scan, 0) : new Array(lungs).fill(0);
+  return { ...simulated, offsets: fitted.map((ml) => -ml) };
 }
 
 /** Return the lowest and the highest simulated volume of each lung, [[low, high], ...], for a direction of gravity. */
@@ -40,17 +44,23 @@ function chebyshev(order, t) {
   return values.slice(0, order + 1);
 }
 
-/** Divide a total volume among the lungs as the simulator did. Then move each share into the lung's limits, and give what
- * is left to lungs that have room. */
-function simulatedShares({ simulated: { shares, total: range }, lungs }, gravity, limits, total) {
+/** Return what the fit of the simulated volumes gives each lung of a total. */
+function fittedShares({ simulated: { shares, total: range }, lungs }, gravity, total) {
   const y = harmonics(2, gravity);
   const orders = shares.length / lungs / y.length;
   const polynomials = chebyshev(orders - 1, Math.max(-1, Math.min(1, toUnit(total, ...range))));
-  const volumes = limits.map(([low, high], lung) => {
+  return Array.from({ length: lungs }, (_, lung) => {
     let sum = 0;
     for (let i = 0; i < y.length * orders; ++i) sum += shares[lung * y.length * orders + i] * y[Math.floor(i / orders)] * polynomials[i % orders];
-    return Math.max(low, Math.min(high, sum));
+    return sum;
   });
+}
+
+/** Divide a total volume among the lungs as the simulator did. Then move each share into the lung's limits, and give what
+ * is left to lungs that have room. */
+function simulatedShares(basis, gravity, limits, total) {
+  const fitted = fittedShares(basis, gravity, total);
+  const volumes = limits.map(([low, high], lung) => Math.max(low, Math.min(high, fitted[lung] + basis.simulated.offsets[lung])));
   let left = total - sumOf(volumes);
   limits.forEach(([low, high], lung) => {
     const room = (left > 0 ? high : low) - volumes[lung];
@@ -109,8 +119,7 @@ function simulatedMoment(basis, gravity, depth) {
   const origin = simulatedOrigin(basis, gravity);
   const range = simulatedRange(basis, gravity);
   const above = Math.max(range[0], Math.min(range[1], depth));
-  const held = (volumes) => volumes.every((ml, lung) => ml >= limits[lung][0] && ml <= limits[lung][1]);
-  const volumes = above === 0 && held(origin) ? origin : simulatedShares(basis, gravity, limits, sumOf(origin) + above);
+  const volumes = simulatedShares(basis, gravity, limits, sumOf(origin) + above);
   const path = pathOf(basis, gravity);
   const found = volumes.map((ml, lung) => {
     const [low, high] = limits[lung].map((limit) => toUnit(limit, ...basis.simulated.range.subarray(2 * lung, 2 * lung + 2)));

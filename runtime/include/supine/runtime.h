@@ -237,7 +237,9 @@ SUPINE_API supine_status supine_basis_weights(const supine_basis *basis, const d
  * A volume of all lungs is divided among them. Above rest, every lung is inflated by the same
  * fraction of the difference between its volumes at rest and at full inflation [MilicEmili1966].
  * Below rest, all lungs hold the same fraction of their volumes at rest. The three gains of a lung
- * then follow from its volume (supine_volume_bend).
+ * then follow from its volume (supine_volume_bend). If another simulator's displacements depend on
+ * volume, the total is divided as the simulator did, whatever it is relative to; in the posture of
+ * the scan and at its volume, each lung has its own volume of the scan.
  *
  * SUPINE_VOLUME_DEFAULT means the volume at rest if the file has one. Otherwise, it means 500 mL
  * above the volume in the scan or, for a file made from another simulator's displacements, gains of
