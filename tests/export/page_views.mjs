@@ -97,6 +97,30 @@ async function checkShown(page) {
   }
 }
 
+/** Return the picture that a user saves, without the page around it. */
+async function drawn(page) {
+  await settled(page);
+  return page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer())).join());
+}
+
+/** Check that a lung is seen from every side, also through the table on which the patient lies. */
+async function checkSides(page) {
+  for (const [posture, views] of [['1', 'ap'], ['2', 'ap'], ['3', 'lr']]) {
+    for (const view of views) {
+      await press(page, posture);
+      await press(page, view);
+      await page.waitForFunction(() => !window.supine.state.turning);
+      const shown = await drawn(page);
+      await page.locator('[name=lung-1][value="0"]').check();
+      assert.notEqual(await drawn(page), shown, `posture ${posture}, view ${view}: no lung is seen`);
+      await page.locator('[name=lung-1][value="1"]').check();
+    }
+  }
+  await press(page, '1');
+  await press(page, 'a');
+  await page.waitForFunction(() => !window.supine.state.turning);
+}
+
 /** Check that marked points move with the tissue and measure distances, and that a link restores them. */
 async function checkProbes(page) {
   const box = await page.locator('#picture').boundingBox();
@@ -159,6 +183,7 @@ await checkViews(page);
 await checkCamera(page);
 await checkPostures(page);
 await checkShown(page);
+await checkSides(page);
 await checkProbes(page);
 await checkFrames(page);
 await checkLoss(page);

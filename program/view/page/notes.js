@@ -82,9 +82,15 @@ class Notes {
     const size = Math.hypot(gx, gy);
     context.strokeStyle = context.fillStyle = css('--ink');
     context.lineWidth = 3;
-    if (size > 0.15) drawArrow(context, [x - 40 * gx, y + 40 * gy], [x + 40 * gx, y - 40 * gy], 11);
-    const [word, from] = size > 0.15 ? ['gravity', -40 * Math.abs(gy) - 12] : [`gravity, ${rotate(pane.turn, pane.gravity)[2] > 0 ? 'towards you' : 'away from you'}`, 0];
-    this.text(word, x, y + from, { align: 'center', font: '12px' });
+    if (size > 0.15) {
+      drawArrow(context, [x - 40 * gx, y + 40 * gy], [x + 40 * gx, y - 40 * gy], 11);
+      this.text('gravity', x, y - 40 * Math.abs(gy) - 12, { align: 'center', font: '12px' });
+    } else {
+      const words = `gravity, ${rotate(pane.turn, pane.gravity)[2] > 0 ? 'towards you' : 'away from you'}`;
+      context.font = '12px system-ui, sans-serif';
+      const half = context.measureText(words).width / 2 + 10; // with a margin to the edge of the picture
+      this.text(words, Math.max(half, Math.min(this.canvas.clientWidth - half, x)), y - 16, { align: 'center', font: '12px' });
+    }
   }
 
   /** Draw a target's name, in a colour, and a line from it to the target. A name that would cover a taken box moves

@@ -618,7 +618,9 @@ class Picture {
     gl.uniform1f(solid.at.thick, 0);
     gl.uniform4fv(solid.at.tint, pane.tableTint);
     gl.bindVertexArray(this.table);
+    gl.depthMask(false); // seen from below, the lungs shine through it
     gl.drawArrays(gl.TRIANGLES, 0, 36);
+    gl.depthMask(true);
   }
 
   /** Draw a text, wrapped, on a panel before a headset's viewer; `at` is its place in the room, m. */
