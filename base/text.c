@@ -17,6 +17,13 @@ void supine_text_add(char *text, size_t size, const char *format, ...) {
   va_end(arguments);
 }
 
+void supine_text_suggest(const char *before, const char *word, char *text, size_t size) {
+  text[0] = '\0';
+  if (word != NULL) {
+    (void)supine_print_text(text, size, "; did you mean '%s%s'?", before, word);
+  }
+}
+
 const char *supine_text_file_name(const char *path) {
   const char *slash = strrchr(path, '/');
   return slash != NULL ? slash + 1 : path;

@@ -13,6 +13,12 @@
 SUPINE_PRINTF(3, 4)
 void supine_text_add(char *text, size_t size, const char *format, ...);
 
+/** Write "; did you mean 'WORD'?", to follow what is wrong in a message; or nothing if `word` is
+ * NULL.
+ * @param before  what stands before the word, such as "--"
+ * @param text    [size] written */
+void supine_text_suggest(const char *before, const char *word, char *text, size_t size);
+
 /** Return whether a text is UTF-8. */
 bool supine_text_is_utf8(const char *text);
 

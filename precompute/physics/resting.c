@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/text.h"
 
 /* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
  * tissue. Rows: left lung, right lung. Columns: lying on the left, on the right, supine, prone,
@@ -117,13 +118,12 @@ supine_status supine_physics_resting_set(supine_resting *resting, const char *po
     set.assumed = SUPINE_COPD_SHARE;
     set.spread = SUPINE_COPD_SPREAD;
   } else if (supine_posture_gravity(posture, g) != SUPINE_OK) {
-    const char *nearest = supine_posture_nearest(posture);
+    char suggestion[64];
+    supine_text_suggest("", supine_posture_nearest(posture), suggestion, sizeof suggestion);
     return supine_error_set(
         error, SUPINE_ERROR_ARGUMENT,
-        "'%s' is not a posture%s%s%s: give supine, prone, left, right, upright or "
-        "inverted",
-        posture, nearest != NULL ? "; did you mean '" : "", nearest != NULL ? nearest : "",
-        nearest != NULL ? "'" : "");
+        "'%s' is not a posture (supine, prone, left, right, upright, inverted)%s", posture,
+        suggestion);
   }
   if (value != NULL) {
     const bool read = read_values(&set, g, value);

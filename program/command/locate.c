@@ -67,13 +67,13 @@ static supine_status find_vertex(const char *path, const char *text,
   }
   const char *nearest =
       supine_options_suggest(text, (const char *const *)names->text, names->count);
+  char suggestion[256];
+  supine_text_suggest("", nearest, suggestion, sizeof suggestion);
   SUPINE_REFUSE_IF(found > 1, error, SUPINE_ERROR_FORMAT,
                    "%s: '%s' has %zu vertices, so it is not a point: give the name of a point",
                    path, text, found);
   SUPINE_REFUSE_IF(found == 0, error, SUPINE_ERROR_FORMAT,
-                   "%s: no point '%s' in the file of --points%s%s%s", path, text,
-                   nearest == NULL ? "" : "; did you mean '", nearest == NULL ? "" : nearest,
-                   nearest == NULL ? "" : "'?");
+                   "%s: no point '%s' in the file of --points%s", path, text, suggestion);
   return SUPINE_OK;
 }
 

@@ -169,9 +169,9 @@ static supine_status refuse_unknown(const reading *r, int got, const char *given
   SUPINE_REFUSE_IF(got == ':', error, SUPINE_ERROR_ARGUMENT, "option '%s' needs a value", given);
   const char *nearest =
       strncmp(given, "--", 2) == 0 ? supine_options_suggest(given + 2, names, r->count + 1) : NULL;
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no option '%s'%s%s%s", given,
-                          nearest != NULL ? "; did you mean '--" : "",
-                          nearest != NULL ? nearest : "", nearest != NULL ? "'?" : "");
+  char suggestion[128];
+  supine_text_suggest("--", nearest, suggestion, sizeof suggestion);
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no option '%s'%s", given, suggestion);
 }
 
 static supine_status read_options(reading *r, int argc, char **argv, supine_error *error) {

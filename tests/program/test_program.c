@@ -201,7 +201,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
   EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL\n  full inflation 6000 mL",
          "precompute low.ply --scanned full-2000 --band 7 -o low.safetensors");
-  EXPECT(0, "also in the scan, which then holds 4653 mL", /* 0.5 of 2695.0 mL is missing */
+  EXPECT(0, "in every state but the scan: to 4653 mL", /* 0.5 of 2695.0 mL is missing */
          "precompute lungs.ply --lung left:0.5 --modes 1 --held-out 20 -o r.safetensors");
   EXPECT(0, "from prone at rest", "deform lungs.safetensors --posture left --from prone -o a.ply");
   EXPECT(1, "--resting: 'foo' is not a posture",
