@@ -129,10 +129,13 @@ chain q_supine_full p rest 0.2 rest+2000 0.2
   fail "validate where nothing moved"
 grep -q '"explained_percent": null' valid.json || fail "a share is explained where nothing moved"
 
-# If a scan that is declared to be at rest holds too much gas, fit gives a warning.
-"$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note ||
+# If lungs at rest hold too much gas by the states that the scans are declared to have, fit gives a warning; a volume as in
+# COPD is taken.
+"$supine" fit s_supine_rest+500.ply q_supine_full.ply --rest supine:rest-1800 --other supine:full -o x.json >out 2>note ||
   fail "fit a fuller rest"
-grep -q 'the volume at rest is 56 % of full inflation' note || fail "no warning: $(cat note)"
+grep -q 'the volume at rest is 86 % of full inflation' note || fail "no warning: $(cat note)"
+"$supine" fit s_supine_rest+500.ply q_supine_full.ply --other supine:full -o x.json >out 2>note || fail "fit rest"
+grep -q 'the volume at rest' note && fail "a volume as in COPD is told: $(cat note)"
 
 # Two absolute volumes are rest and full inflation; a scan is recognised by its volume. The patient's full inflation is
 # kept if the state of the scan is given.
