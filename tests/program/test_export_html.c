@@ -165,15 +165,24 @@ static void check_corners(const char *page, const uint32_t *corners, size_t coun
   free(found);
 }
 
+/* Open a basis, and find the order in which a page stores its vertices and triangles.
+ * @param simplify  number of vertices to which the surface is reduced, or 0 */
+static const supine_basis_info *open_in_order(const char *path, size_t simplify,
+                                              supine_basis **opened, supine_arena *arena,
+                                              export_order *order) {
+  assert_int_equal(supine_basis_open(path, opened, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(*opened);
+  assert_int_equal(supine_export_order_make(info, true, simplify, arena, order, NULL), SUPINE_OK);
+  return info;
+}
+
 TEST(test_page_tensors_equal_basis) {
   assert_int_equal(EXPORT_RUN(text, basis, "-o", out), 0);
   char *page = read_page();
   supine_basis *opened = NULL;
-  assert_int_equal(supine_basis_open(basis, &opened, NULL), SUPINE_OK);
-  const supine_basis_info *s = supine_basis_get_info(opened);
   SUPINE_ARENA arena = {0};
   export_order order = {0};
-  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
+  const supine_basis_info *s = open_in_order(basis, 0, &opened, &arena, &order);
   check_motion(page, s, order.vertex);
   check_corners(page, order.corners, 3 * s->triangle_count);
   check_tensor(page, "modes", s->modes, 6 * 16 * sizeof(double));
@@ -207,9 +216,7 @@ TEST(test_page_of_vector_basis_coefficients_equal_basis) {
   supine_basis *opened = NULL;
   SUPINE_ARENA arena = {0};
   export_order order = {0};
-  assert_int_equal(supine_basis_open(vector, &opened, NULL), SUPINE_OK);
-  const supine_basis_info *s = supine_basis_get_info(opened);
-  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
+  const supine_basis_info *s = open_in_order(vector, 0, &opened, &arena, &order);
   const size_t n = s->vertex_count;
   const size_t k = s->mode_count;
   const size_t stride = (k + 1) / 2 * 2;
@@ -239,9 +246,7 @@ TEST(test_page_of_clusters_equals_basis) {
   supine_basis *opened = NULL;
   SUPINE_ARENA arena = {0};
   export_order order = {0};
-  assert_int_equal(supine_basis_open(clusters, &opened, NULL), SUPINE_OK);
-  const supine_basis_info *s = supine_basis_get_info(opened);
-  assert_int_equal(supine_export_order_make(s, true, 0, &arena, &order, NULL), SUPINE_OK);
+  const supine_basis_info *s = open_in_order(clusters, 0, &opened, &arena, &order);
   int16_t *rows = take_rows(page, "clusters", s->vertex_count, 4);
   for (size_t i = 0; i < s->vertex_count; ++i) {
     const size_t v = order.vertex[i];
@@ -282,9 +287,7 @@ TEST(test_page_simplified_vertices_are_original_rows) {
   supine_basis *opened = NULL;
   SUPINE_ARENA arena = {0};
   export_order order = {0};
-  assert_int_equal(supine_basis_open(whole, &opened, NULL), SUPINE_OK);
-  const supine_basis_info *s = supine_basis_get_info(opened);
-  assert_int_equal(supine_export_order_make(s, true, 600, &arena, &order, NULL), SUPINE_OK);
+  const supine_basis_info *s = open_in_order(whole, 600, &opened, &arena, &order);
   assert_true(order.vertex_count > 500 && order.vertex_count < 700);
   assert_int_equal(number_of(page, "vertices"), order.vertex_count);
   assert_int_equal(number_of(page, "wholeVertices"), s->vertex_count);
