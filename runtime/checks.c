@@ -2,7 +2,6 @@
 /* Check that lungs can hold the volumes of a state, by the range that the file holds. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include <supine/inputs.h>
 
@@ -123,7 +122,6 @@ supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pos
   const supine_state scan = supine_basis_scan(basis);
   if (basis->info.is_fields) {
     *pose = (supine_pose){.basis = basis->info.identity};
-    memcpy(pose->expansion, basis->scan_expansion, sizeof pose->expansion);
     return SUPINE_OK;
   }
   return supine_basis_pose_any(basis, &scan, pose, error);
