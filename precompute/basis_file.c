@@ -195,7 +195,9 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   add_by_lung(list, "reference_volume_ml", lungs->lung_count, volume);
   if (share[0] != 1.0 || share[1] != 1.0) {
     double hilum[2][3];
-    double expansion[2]; /* factor on the lengths in the scan minus 1 */
+    /* As supine_pose.expansion. It follows from the share, but is stored, so that the run-time
+     * library for WebAssembly needs no cube roots. */
+    double expansion[2];
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
       supine_lungs_find_hilum(lungs, lung, hilum[lung]);
       expansion[lung] = 1.0 / cbrt(share[lung]) - 1.0;

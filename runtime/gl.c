@@ -10,7 +10,7 @@ _Static_assert((int)SUPINE_GL_FRAME_FLOATS == (int)SUPINE_CLUSTER_FRAME,
                "the texture has whole frames");
 _Static_assert(sizeof(supine_gl_clustered_vertex) == 20, "the members are packed");
 
-/* Return whether the basis has modes at each vertex, and the shader can hold them. */
+/* Return whether vertices move by modes, not by clusters, and by no more than the shader holds. */
 static bool fits(const supine_basis *basis) {
   return basis->info.mode_count <= SUPINE_GL_MODES && basis->info.cluster_count == 0;
 }

@@ -38,9 +38,9 @@ typedef struct supine_simulated {
   size_t share_count;
   /** [lungs, RESTING_TERMS] volume at full inflation as harmonics, or NULL. */
   const double *full;
-  double total[2]; /**< total volumes that are mapped to -1 and 1 */
-  /** Volumes added to those that `shares` give the lungs; 0 if the posture in the scan is unknown.
-   */
+  double total[2]; /**< volumes of all lungs, mL above the surface, where the fit of `shares` has
+                    * the parameter -1 and 1 */
+  /** [lungs] mL added to the volumes that `shares` give; 0 if the posture in the scan is unknown */
   double offset[SUPINE_LUNGS_MAX];
   supine_volume usual; /**< of states without a volume */
 } supine_simulated;

@@ -93,8 +93,8 @@ supine_status supine_simulated_find_offsets(const supine_basis *basis, double *o
   return SUPINE_OK;
 }
 
-/* Divide a total volume among the lungs as the simulator did. In the posture of the scan and at its
- * total volume, each lung has its own volume in the scan.
+/* Divide a total volume among the lungs: as the simulator did, plus a constant for each lung. The
+ * constants make each lung hold its volume in the scan if all lungs together do, in that posture.
  * @param total    mL above the reference surfaces
  * @param volumes  [lungs] mL above the reference surface of each lung, written; they add up to the
  *   total */

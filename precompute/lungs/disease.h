@@ -41,7 +41,8 @@ supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_le
  * @param vertices  [N, 3] output, mm */
 void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
 
-/** Estimate the hilum of a lung, mm: the point about which supine_lungs_collapse shrinks it. */
+/** Estimate the hilum of a lung, mm: the mean of the vertices in the quarter of the lung nearest
+ * the midline. supine_lungs_collapse shrinks the lung about this point, which stays where it is. */
 void supine_lungs_find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]);
 
 /** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place.

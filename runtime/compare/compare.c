@@ -188,7 +188,8 @@ static double displacement(const supine_basis *basis, const double *q, size_t i)
   return supine_length(u);
 }
 
-/* Write the distances of a lung's vertices between two poses, of which at least one expands a lung.
+/* Write the distance of each vertex between two poses, one of which at least expands a lung, so
+ * that the products of the modes do not give the distance.
  * @param from  NULL for the reference surface */
 static void expanded_distances(const supine_basis *basis, const supine_pose *pose,
                                const supine_pose *from, float *distance) {

@@ -232,7 +232,8 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
 
 enum { INSIDE = 5 }; /* points inside the lungs, of which the first three are in the left lung */
 
-/* Write points within 20 mm of the middle of each lung to the CSV file, three in the left lung. */
+/* Write five points to the CSV file, each within 22 mm of the middle of its lung: three in the left
+ * lung, then two in the right one. */
 static void write_points_inside(double given[INSIDE][3]) {
   static const double aside[INSIDE][3] = {
       {0.0, 0.0, 0.0}, {7.0, -11.0, 13.0}, {-6.0, 12.0, -17.0}, {0.0, 0.0, 0.0}, {3.0, 15.0, 11.0}};
@@ -351,7 +352,8 @@ TEST(test_precompute_collapsed_lung_scan_is_before_collapse) {
   (void)unlink(inside);
 }
 
-/* Distances, expected errors and shaders with a pose of the scan before a collapse. */
+/* The scan shows a lung before its collapse. Distances from the scan and their expected errors
+ * include the collapse, and the shader refuses the pose of the scan. */
 TEST(test_collapsed_lung_scan_pose_compared_and_refused_by_shader) {
   supine_basis *basis = NULL;
   supine_compare *compare = NULL;
