@@ -6,7 +6,7 @@ supine=$1
 folder=$2
 lungs=$(dirname "$0")/../examples/lungs
 mkdir -p "$folder"
-"$supine" precompute "$lungs/left.ply" "$lungs/right.ply" -o "$folder/lungs.safetensors"
+"$supine" precompute "$lungs/left.obj" "$lungs/right.obj" -o "$folder/lungs.safetensors"
 "$supine" embed "$folder/lungs.safetensors" "$lungs/targets.csv" "$lungs/airways.ply" -o "$folder/inside.safetensors"
 "$supine" export "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" \
   --title "Lungs: test data of Chaste, University of Oxford (BSD-3-Clause). Targets and airways are fictitious." \

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make a CT and a segmentation from surfaces of lungs (binary PLY), for trials without a patient's scan:
+"""Make a CT and a segmentation from surfaces of lungs (OBJ), for trials without a patient's scan:
 
-    python3 synthetic_ct.py left.ply right.ply
+    python3 synthetic_ct.py left.obj right.obj
 
 This writes ct.nii.gz, in Hounsfield units, and the folder segmentation with one mask for each lobe, in the files and with
 the names that TotalSegmentator writes. Voxels have sides of 4 mm. The program needs numpy and nibabel."""
@@ -15,11 +15,10 @@ STEP = 4.0  # mm
 
 
 def read(path):
-    """Return the corners of each triangle of a surface, mm."""
-    header, body = open(path, "rb").read().split(b"end_header\n", 1)
-    counts = [int(line.split()[-1]) for line in header.decode().splitlines() if line.startswith("element")]
-    vertices = np.frombuffer(body, "<f4", 3 * counts[0]).reshape(-1, 3)
-    return vertices[np.frombuffer(body, [("n", "u1"), ("v", "<i4", 3)], counts[1], vertices.nbytes)["v"]].astype(float)
+    """Return the corners of each triangle of a surface in OBJ, mm."""
+    lines = [line.split() for line in open(path, encoding="utf-8")]
+    vertices = np.array([line[1:4] for line in lines if line[:1] == ["v"]], float)
+    return vertices[np.array([line[1:4] for line in lines if line[:1] == ["f"]], int) - 1]
 
 
 def voxels_inside(corners):

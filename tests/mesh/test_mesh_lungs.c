@@ -32,8 +32,8 @@ TEST(test_load_example_lungs_known_counts_and_volumes) {
     size_t vertices;
     size_t triangles;
     double litres;
-  } cases[] = {{SUPINE_EXAMPLE_LUNGS "/left.ply", 5000, 9996, 3.4308},
-               {SUPINE_EXAMPLE_LUNGS "/right.ply", 5002, 10000, 4.1798}};
+  } cases[] = {{SUPINE_EXAMPLE_LUNGS "/left.obj", 5000, 9996, 3.4308},
+               {SUPINE_EXAMPLE_LUNGS "/right.obj", 5002, 10000, 4.1798}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
     supine_mesh_report report = {0};
     supine_mesh mesh = {0};
@@ -52,7 +52,7 @@ TEST(test_load_example_lungs_known_counts_and_volumes) {
   }
 }
 
-TEST(test_load_real_lungs_known_counts_and_volumes) {
+TEST_FULL(test_load_real_lungs_known_counts_and_volumes) {
   static const struct {
     const char *name;
     size_t vertices;
@@ -87,7 +87,7 @@ TEST(test_load_real_lungs_known_counts_and_volumes) {
   }
 }
 
-TEST(test_load_real_stl_lungs_closed) {
+TEST_FULL(test_load_real_stl_lungs_closed) {
   static const struct {
     const char *name;
     size_t vertices;
@@ -108,7 +108,7 @@ TEST(test_load_real_stl_lungs_closed) {
   }
 }
 
-TEST(test_topology_damaged_real_lung_edges_counted) {
+TEST_FULL(test_topology_damaged_real_lung_edges_counted) {
   supine_mesh mesh = lung_load("covid/covid005_left_DEFECT.ply", NULL);
   supine_topology topology = topology_of(&mesh);
   assert_int_equal(topology.boundary_edges, 2);
@@ -123,7 +123,7 @@ TEST(test_topology_damaged_real_lung_edges_counted) {
 /* An STL file repeats a vertex in every triangle that has it. Loading merges these copies. */
 TEST(test_save_real_lung_as_stl_loads_same_surface) {
   supine_mesh mesh = {0};
-  assert_int_equal(supine_mesh_load(SUPINE_EXAMPLE_LUNGS "/left.ply", NULL, &mesh, NULL, NULL),
+  assert_int_equal(supine_mesh_load(SUPINE_EXAMPLE_LUNGS "/left.obj", NULL, &mesh, NULL, NULL),
                    SUPINE_OK);
   char path[256];
   const supine_mesh_save_options options = {.axes = SUPINE_AXES_RAS};

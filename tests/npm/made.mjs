@@ -22,7 +22,7 @@ const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+12
 const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis without volumes at rest
 /** Paths of bases, each with the states to test. */
 export const bases = [[demo, states], [inside, states], [unrested, ofScan]];
-const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `${side}.ply`));
+const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `${side}.obj`));
 bases.push([join(folder, 'real.safetensors'), states]);
 supine('precompute', ...real, '-o', bases.at(-1)[0]);
 
