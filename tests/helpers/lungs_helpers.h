@@ -41,30 +41,16 @@ static inline supine_mesh helper_lump(size_t frequency, double x, uint64_t seed)
   return mesh;
 }
 
-/* Find a file of real lungs (tests/README.md). If the folder of test data is missing, the lungs of
- * examples/lungs, 5,000 vertices each, replace those of the same adult. Return false if there are
- * none. */
+/* Find a file of real lungs: left.obj or right.obj of examples/lungs, which is always there, or a
+ * file in the folder of test data (tests/README.md). Return false if it is missing. */
 static inline bool helper_real_path(const char *name, char path[512]) {
-  (void)snprintf(path, 512, "%s/%s", SUPINE_TEST_DATA, name);
+  const bool shipped = strchr(name, '/') == NULL;
+  (void)snprintf(path, 512, "%s/%s", shipped ? SUPINE_EXAMPLE_LUNGS : SUPINE_TEST_DATA, name);
   if (access(path, R_OK) == 0) {
     return true;
   }
-  for (int side = 0; side < 2; ++side) {
-    static const char *const begin[2] = {"lungs/chaste_left", "lungs/chaste_right"};
-    static const char *const file[2] = {"left.ply", "right.ply"};
-    if (strncmp(name, begin[side], strlen(begin[side])) == 0) {
-      (void)snprintf(path, 512, "%s/%s", SUPINE_EXAMPLE_LUNGS, file[side]);
-      return true;
-    }
-  }
-  printf("skipped: %s is missing\n", name);
+  printf("skipped: %s is missing\n", path);
   return false;
-}
-
-/* Return whether the folder of test data has lungs of one adult at several resolutions. Without
- * it, there are only those of examples/lungs. */
-static inline bool helper_has_resolutions(void) {
-  return access(SUPINE_TEST_DATA "/lungs/chaste_left.ply", R_OK) == 0;
 }
 
 /* Load one or two surfaces of real lungs into one supine_lungs. Return false if a file is missing.
@@ -99,8 +85,7 @@ static inline bool helper_real_lungs(const char *const *names, size_t count, sup
  * a file is missing, leave both empty and return false. */
 static inline bool helper_real_left_lung(supine_lungs *coarse, supine_lungs *fine) {
   static const char *const name[2] = {"lungs/chaste_left_5k.obj", "lungs/chaste_left.ply"};
-  const bool loaded = helper_has_resolutions() &&
-                      helper_real_lungs(&name[0], 1, SUPINE_AXES_LPS, coarse) &&
+  const bool loaded = helper_real_lungs(&name[0], 1, SUPINE_AXES_LPS, coarse) &&
                       helper_real_lungs(&name[1], 1, SUPINE_AXES_LPS, fine);
   if (!loaded) {
     supine_lungs_free(coarse);

@@ -18,10 +18,16 @@
 #include <unistd.h>
 
 /* Define a test: TEST(test_name) { ... }. The group's setup may set `*state`. */
-#define TEST(name)                                                                                 \
+#define TEST(name) TEST_OF(name, false)
+
+/* Define a test that needs lungs that are not shipped (tests/README.md), or another program. Only
+ * `test_NAME full` runs it, which is the test NAME_full of CTest. */
+#define TEST_FULL(name) TEST_OF(name, true)
+
+#define TEST_OF(name, full)                                                                        \
   static void name(void **state);                                                                  \
   __attribute__((constructor)) static void name##_add(void) {                                      \
-    test_add(#name, name);                                                                         \
+    test_add(#name, name, full);                                                                   \
   }                                                                                                \
   static void name(__attribute__((unused)) void **state)
 
@@ -31,7 +37,7 @@
     test_set_group(setup, teardown);                                                               \
   }
 
-void test_add(const char *name, CMUnitTestFunction test);
+void test_add(const char *name, CMUnitTestFunction test, bool full);
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown);
 
 /* Assert |value - expected| <= tolerance. On failure print both in double precision, because

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Run the tests that TEST defines, in the order of their definitions. If a test is skipped and none
+/* Run the tests that TEST defines, or with the argument `full` those of TEST_FULL, in the order of
+ * their definitions. If a test is skipped and none
  * fails, exit with 77, so that CTest reports a skipped program. */
 #include "tests/helpers/test.h"
 
@@ -12,16 +13,16 @@
 
 enum { SKIPPED = 77 }; /* exit code of a skipped program, as SKIP_RETURN_CODE in CMakeLists.txt */
 
-static struct CMUnitTest tests[64];
-static size_t test_count;
+static struct CMUnitTest tests[2][64]; /* of TEST and of TEST_FULL */
+static size_t test_count[2];
 static CMFixtureFunction group_setup, group_teardown;
 static bool skipped;
 
-void test_add(const char *name, CMUnitTestFunction test) {
-  if (test_count == sizeof tests / sizeof *tests) {
+void test_add(const char *name, CMUnitTestFunction test, bool full) {
+  if (test_count[full] == sizeof tests[full] / sizeof *tests[full]) {
     abort();
   }
-  tests[test_count++] = (struct CMUnitTest){.name = name, .test_func = test};
+  tests[full][test_count[full]++] = (struct CMUnitTest){.name = name, .test_func = test};
 }
 
 void test_set_group(CMFixtureFunction setup, CMFixtureFunction teardown) {
@@ -48,12 +49,13 @@ static void set_locale(void) {
   }
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+  const bool full = argc > 1 && strcmp(argv[1], "full") == 0;
   set_locale();
   if (gsl_set_error_handler_off != NULL) {
     (void)gsl_set_error_handler_off(); /* GSL's default handler would abort the program */
   }
   const int failed =
-      _cmocka_run_group_tests("tests", tests, test_count, group_setup, group_teardown);
+      _cmocka_run_group_tests("tests", tests[full], test_count[full], group_setup, group_teardown);
   return failed == 0 && skipped ? SKIPPED : failed;
 }

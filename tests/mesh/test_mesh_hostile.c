@@ -330,7 +330,7 @@ static size_t sweep(const char *name) {
   return count;
 }
 
-TEST(test_load_each_test_file_of_assimp_read_or_refused) {
+TEST_FULL(test_load_each_test_file_of_assimp_read_or_refused) {
   static const char *const folders[] = {"OBJ", "OFF", "PLY", "STL", "invalid"};
   for (size_t i = 0; i < sizeof folders / sizeof *folders; ++i) {
     if (sweep(folders[i]) == 0) {
@@ -340,7 +340,7 @@ TEST(test_load_each_test_file_of_assimp_read_or_refused) {
   }
 }
 
-TEST(test_load_known_files_of_assimp_expected_counts) {
+TEST_FULL(test_load_known_files_of_assimp_expected_counts) {
   static const struct {
     const char *name;
     supine_status status;

@@ -25,7 +25,7 @@ static void deform_exactly(const supine_basis_info *info, const supine_pose *pos
 }
 
 TEST(test_deform_real_lung_every_path_within_stated_error) {
-  static const char *const names[] = {"lungs/chaste_left_5k.obj"};
+  static const char *const names[] = {"left.obj"};
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &lungs)) {
     skip();

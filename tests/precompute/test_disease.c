@@ -9,7 +9,7 @@
 
 #include "tests/helpers/lungs_helpers.h"
 
-static const char *const real_names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+static const char *const real_names[] = {"left.obj", "right.obj"};
 static const double supine[3] = {0.0, 1.0, 0.0};
 
 static supine_model model;

@@ -376,11 +376,11 @@ static void check_real_lungs(const char *const *names, supine_axes axes) {
 }
 
 TEST(test_solve_real_adult_equals_direct_solution) {
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  static const char *const names[] = {"left.obj", "right.obj"};
   check_real_lungs(names, SUPINE_AXES_AUTO);
 }
 
-TEST(test_solve_real_ras_lungs_equal_direct_solution) {
+TEST_FULL(test_solve_real_ras_lungs_equal_direct_solution) {
   static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
   check_real_lungs(names, SUPINE_AXES_RAS);
 }

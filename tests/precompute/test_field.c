@@ -578,14 +578,14 @@ static void check_warped_by(const char *probe, const char *command) {
   supine_image_free(&image);
 }
 
-TEST(test_plastimatch_inverse_field_warps_landmarks) {
+TEST_FULL(test_plastimatch_inverse_field_warps_landmarks) {
   check_warped_by("plastimatch --version",
                   "plastimatch warp --input balls.nrrd --fixed balls.nrrd --xf v.nrrd "
                   "--output-img warped.nrrd --output-type short >plastimatch.log 2>&1");
 }
 
 /* transformix, a program of elastix, takes the inverse field as a transform. */
-TEST(test_elastix_inverse_field_warps_landmarks) {
+TEST_FULL(test_elastix_inverse_field_warps_landmarks) {
   FILE *file = fopen(in_folder("field.txt"), "wb");
   assert_non_null(file);
   (void)fputs("(Transform \"DeformationFieldTransform\")\n(NumberOfParameters 0)\n"

@@ -258,14 +258,14 @@ TEST(test_fit_exact_other_directions_error_of_storage_as_stated) {
 }
 
 TEST(test_fit_real_lung_other_directions_error_as_stated) {
-  static const char *const names[] = {"lungs/chaste_left_5k.obj"};
+  static const char *const names[] = {"left.obj"};
   supine_lungs real = {0};
   if (!helper_real_lungs(names, 1, SUPINE_AXES_AUTO, &real)) {
     skip();
     return;
   }
   check_stated_error(&real, physics_fields(&real, 60, 2008, 1.0),
-                     physics_fields(&real, 40, 1999, 1.0), "chaste_left_5k");
+                     physics_fields(&real, 40, 1999, 1.0), "left lung");
   supine_lungs_free(&real);
 }
 

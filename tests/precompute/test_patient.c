@@ -113,7 +113,7 @@ TEST(test_covariances_any_distance_equal_formula) {
 
 /* Five public pairs of images are each fitted in both directions. The cross-validated errors are
  * below those of a quadratic law on the same folds of points (`quadratic_rms`, commit 220ee0d). */
-TEST(test_fit_public_landmarks_err_less_than_quadratic_law) {
+TEST_FULL(test_fit_public_landmarks_err_less_than_quadratic_law) {
   static const struct {
     const char *name;
     double quadratic_rms[2]; /* RMS error of the quadratic law, mm: inhaled to exhaled image, and

@@ -143,7 +143,7 @@ static void expect_lesion(const supine_lungs *rest, const supine_lungs *other,
   assert_true(found.report.held_out[SUPINE_PATIENT_SCORE_CORRECTED] == found.expand.held_out[1]);
 }
 
-TEST(test_fit_real_lung_with_lesion_recovers_stiffness) {
+TEST_FULL(test_fit_real_lung_with_lesion_recovers_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {
@@ -211,7 +211,7 @@ TEST(test_fit_synthetic_lungs_with_gradient_recovers_stiffness) {
   supine_lungs_free(&other);
 }
 
-TEST(test_fit_real_lung_with_gradient_recovers_stiffness) {
+TEST_FULL(test_fit_real_lung_with_gradient_recovers_stiffness) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {

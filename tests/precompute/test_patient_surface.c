@@ -31,7 +31,7 @@ static double *moved_by_truth(const supine_lungs *lungs, double *largest) {
   return positions;
 }
 
-TEST(test_fit_surface_known_law_recovered_on_another_mesh) {
+TEST_FULL(test_fit_surface_known_law_recovered_on_another_mesh) {
   supine_lungs rest = {0};
   supine_lungs other = {0};
   if (!helper_real_left_lung(&rest, &other)) {

@@ -44,9 +44,9 @@ static supine_lungs phantom(size_t vertices) {
   return lungs;
 }
 
-/* Load both lungs of an adult, 20,001 vertices each; skip the test if they are missing. */
+/* Load both lungs of examples/lungs. */
 static supine_lungs real_pair(void) {
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  static const char *const names[] = {"left.obj", "right.obj"};
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {
     skip(); /* skip() does not return */
@@ -156,11 +156,11 @@ static void check_coefficients(const char *const *names, supine_axes axes) {
 }
 
 TEST(test_precompute_real_adult_coefficients_equal_direct_solution) {
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  static const char *const names[] = {"left.obj", "right.obj"};
   check_coefficients(names, SUPINE_AXES_AUTO);
 }
 
-TEST(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
+TEST_FULL(test_precompute_real_ras_lungs_coefficients_equal_direct_solution) {
   static const char *const names[] = {"covid/covid001_left.ply", "covid/covid001_right.ply"};
   check_coefficients(names, SUPINE_AXES_RAS);
 }
@@ -374,11 +374,11 @@ static void check_best_modes(const char *name, supine_axes axes, double soften, 
 }
 
 TEST(test_precompute_real_lung_error_within_0_6_percent) {
-  check_best_modes("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 0.0, 0.005, 8.0);
-  check_best_modes("lungs/chaste_left_5k.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
+  check_best_modes("left.obj", SUPINE_AXES_AUTO, 0.0, 0.005, 8.0);
+  check_best_modes("left.obj", SUPINE_AXES_AUTO, 1.0, 0.006, 8.0);
 }
 
-TEST(test_precompute_other_real_lung_error_within_0_6_percent) {
+TEST_FULL(test_precompute_other_real_lung_error_within_0_6_percent) {
   check_best_modes("covid/covid002_right.ply", SUPINE_AXES_RAS, 0.0, 0.005, 8.0);
   check_best_modes("covid/covid002_right.ply", SUPINE_AXES_RAS, 1.0, 0.006, 8.0);
 }

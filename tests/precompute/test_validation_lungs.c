@@ -24,7 +24,7 @@ static bool load(const char *left, const char *right, supine_lungs *lungs) {
 TEST(test_deform_one_orientation_linear_in_volume) {
   char path[] = "/tmp/supine-validation-XXXXXX";
   supine_lungs lungs = {0};
-  if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
+  if (!load("left.obj", "right.obj", &lungs)) {
     skip();
   }
   const int file = mkstemp(path);
@@ -87,7 +87,7 @@ TEST(test_deform_one_orientation_linear_in_volume) {
  * with about the same gradient, as Kaneko et al. found (J. Appl. Physiol. 21, 1966, 767-777). */
 TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
   supine_lungs lungs = {0};
-  if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &lungs)) {
+  if (!load("left.obj", "right.obj", &lungs)) {
     skip();
   }
   double least = INFINITY;
@@ -115,11 +115,10 @@ TEST(test_solve_all_postures_dependent_zones_ventilate_more) {
 
 /* The same lungs with 5,000 and with 20,000 vertices move differently. If forces are spread over a
  * fixed distance (`reach`, mm), the difference is less than half as large. */
-TEST(test_solve_reach_reduces_change_with_resolution) {
+TEST_FULL(test_solve_reach_reduces_change_with_resolution) {
   supine_lungs coarse = {0};
   supine_lungs fine = {0};
-  if (!helper_has_resolutions() ||
-      !load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
+  if (!load("lungs/chaste_left_5k.obj", "lungs/chaste_right_5k.obj", &coarse) ||
       !load("lungs/chaste_left.ply", "lungs/chaste_right.ply", &fine)) {
     supine_lungs_free(&coarse);
     skip();

@@ -160,7 +160,7 @@ static double *breath_of(const supine_pv_breath *course, double fps, size_t fram
 }
 
 TEST(test_breathe_real_lungs_turning_volumes_exact_in_every_frame) {
-  static const char *const names[] = {"lungs/chaste_left.ply", "lungs/chaste_right.ply"};
+  static const char *const names[] = {"left.obj", "right.obj"};
   char real[80];
   supine_lungs lungs = {0};
   if (!helper_real_lungs(names, 2, SUPINE_AXES_AUTO, &lungs)) {

@@ -393,7 +393,7 @@ static int sweep(const char *path, const struct stat *status, int type, struct F
   return 0;
 }
 
-TEST(test_precompute_hostile_files_never_crash) {
+TEST_FULL(test_precompute_hostile_files_never_crash) {
   char defects[] = SUPINE_TEST_DATA "/defects";
   char *real = realpath(defects, NULL);
   if (real == NULL) {

@@ -7,6 +7,7 @@ import glob
 import os
 import resource
 import shutil
+import subprocess
 import sys
 import tempfile
 
@@ -27,7 +28,7 @@ sys.path.insert(0, os.path.dirname(package))
 import supine  # noqa: E402
 
 os.chdir(work.name)
-assert os.system(f"'{program}' phantom --vertices 1000 -o lungs.ply >log") == 0
+subprocess.run([program, "phantom", "--vertices", "1000", "-o", "lungs.ply"], stdout=subprocess.DEVNULL, check=True)
 lungs = supine.precompute("lungs.ply", held_out=20)
 number = np.random.default_rng(5)
 low, high = lungs.vertices.min(axis=0) - 20, lungs.vertices.max(axis=0) + 20
