@@ -23,15 +23,22 @@ static const double most_overlap = 5.0;
 enum { SAMPLES = 2000 };
 /* Share of a lung's volume that forms its tip in a direction. */
 static const double tip_share = 0.003;
-/* Least and largest length of a tip, in cube roots of the lung's volume. In 32 surfaces of lungs of
- * nine people and in two synthetic lungs, tips were 0.05 to 0.10 long at the head, 0.06 to 0.17 at
- * the feet, and 0.02 to 0.15 elsewhere. A tip longer than `longest_tip` is refused. */
-static const struct {
-  const char *name;
-  double least, most;
-} tips[6] = {{"right", 0.0, 0.25}, {"left", 0.0, 0.25},  {"front", 0.0, 0.25},
-             {"back", 0.0, 0.25},  {"feet", 0.03, 0.25}, {"head", 0.03, 0.135}};
+/* A tip longer than this many cube roots of the lung's volume is refused. */
 static const double longest_tip = 0.5;
+
+/* A direction, and the least and largest length of a lung's tip there, in cube roots of its volume.
+ * In 32 surfaces of lungs of nine people and in two synthetic lungs, tips were 0.05 to 0.10 long at
+ * the head, 0.06 to 0.17 at the feet, and 0.02 to 0.15 elsewhere. */
+typedef struct tip_limits {
+  const char *towards;
+  int axis;
+  double sign; /* of the axis, in this direction */
+  double least, most;
+} tip_limits;
+
+static const tip_limits tips[] = {{"right", 0, -1.0, 0.0, 0.25}, {"left", 0, 1.0, 0.0, 0.25},
+                                  {"front", 1, -1.0, 0.0, 0.25}, {"back", 1, 1.0, 0.0, 0.25},
+                                  {"feet", 2, -1.0, 0.03, 0.25}, {"head", 2, 1.0, 0.03, 0.135}};
 
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
@@ -199,35 +206,52 @@ static double volume_beyond(const supine_mesh *mesh, int axis, double sign, doub
   return sum;
 }
 
+/* Return the outermost vertex of a surface in a direction. */
+static const double *find_outermost(const supine_mesh *mesh, int axis, double sign) {
+  const double *outermost = mesh->vertices + 3 * (size_t)mesh->triangles[0];
+  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    const double *p = mesh->vertices + 3 * (size_t)mesh->triangles[i];
+    if (sign * (p[axis] - outermost[axis]) > 0.0) {
+      outermost = p;
+    }
+  }
+  return outermost;
+}
+
+/* Return how far the outermost `tip_share` of a lung reaches from the vertex `end`, in cube roots
+ * of the lung's volume, mm^3, in steps of 0.01; about `longest_tip` if it is longer. */
+static double measure_tip(const supine_mesh *lung, double volume, const tip_limits *tip,
+                          const double *end) {
+  const double size = cbrt(volume);
+  double length = 0.0;
+  while (length < longest_tip &&
+         volume_beyond(lung, tip->axis, tip->sign, end[tip->axis] - tip->sign * length * size) <
+             tip_share * volume) {
+    length += 0.01;
+  }
+  return length;
+}
+
 /* Check that a lung has no long, thin tip, as of a stray vertex or a trachea, and no flat end. */
-static void check_tips(checks *c, const supine_lungs *lungs, size_t lung) {
+static void check_tip(checks *c, const supine_lungs *lungs, size_t lung, const tip_limits *tip) {
   const supine_mesh part = supine_lungs_part(lungs, lung);
   const double volume = 1e3 * lungs->volume[lung];
-  for (int tip = 0; tip < 6; ++tip) {
-    const int axis = tip / 2;
-    const double sign = tip % 2 == 0 ? -1.0 : 1.0;
-    const double *end = part.vertices + 3 * (size_t)part.triangles[0];
-    double length = 0.0; /* cube roots of the volume */
-    for (size_t i = 0; i < 3 * part.triangle_count; ++i) {
-      const double *p = part.vertices + 3 * (size_t)part.triangles[i];
-      end = sign * (p[axis] - end[axis]) > 0.0 ? p : end;
-    }
-    while (length < longest_tip &&
-           volume_beyond(&part, axis, sign, end[axis] - sign * length * cbrt(volume)) <
-               tip_share * volume) {
-      length += 0.01;
-    }
-    const bool stray = length >= longest_tip;
-    const bool thin = length > tips[tip].most;
-    check(c, !thin && length >= tips[tip].least, stray ? SUPINE_ERROR_MESH : SUPINE_OK,
-          SUPINE_REMEDY_NONE, NULL,
-          "the outermost %g %% of the %s lung towards the %s are %s%.0f mm long, up to "
-          "%.0f,%.0f,%.0f mm (LPS): %s",
-          100.0 * tip_share, supine_lungs_name(lungs, lung), tips[tip].name,
-          stray ? "more than " : "", length * cbrt(volume), end[0], end[1], end[2],
-          thin ? "too thin for a lung: remove the stray vertex, trachea or other part there"
-               : "if the lung is cut off flat there, give a scan that shows all of it");
+  const double *end = find_outermost(&part, tip->axis, tip->sign);
+  const double length = measure_tip(&part, volume, tip, end);
+  const char *advice = "too thin for a lung: remove the stray vertex, trachea or other part there";
+  const char *at_least = "";
+  supine_status refuse = SUPINE_OK;
+  if (length >= longest_tip) {
+    refuse = SUPINE_ERROR_MESH;
+    at_least = "more than ";
+  } else if (length < tip->least) {
+    advice = "if the lung is cut off flat there, give a scan that shows all of it";
   }
+  check(c, length >= tip->least && length <= tip->most, refuse, SUPINE_REMEDY_NONE, NULL,
+        "the outermost %g %% of the %s lung towards the %s are %s%.0f mm long, up to "
+        "%.0f,%.0f,%.0f mm (LPS): %s",
+        100.0 * tip_share, supine_lungs_name(lungs, lung), tip->towards, at_least,
+        length * cbrt(volume), end[0], end[1], end[2], advice);
 }
 
 /* Write the corners of the box in which points may be deeper than `most_overlap` inside a
@@ -387,7 +411,9 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
             ? " (a scan pitched by more than 25 degrees has such a shape, too: turn it upright)"
             : "");
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
-    check_tips(c, lungs, lung);
+    for (size_t i = 0; i < sizeof tips / sizeof *tips; ++i) {
+      check_tip(c, lungs, lung, &tips[i]);
+    }
   }
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
         SUPINE_REMEDY_LUNGS_SEPARATE, NULL,
