@@ -2,12 +2,10 @@
 /* Print a basis file. */
 #include <math.h>
 #include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/compare.h>
 #include <supine/locate.h>
 #include <supine/safetensors.h>
 #include <supine/sh.h>
@@ -17,8 +15,7 @@
 #include "base/text.h"
 #include "precompute/basis_file.h"
 #include "precompute/lungs/disease.h"
-#include "precompute/normals/normal_modes.h"
-#include "precompute/volume_range.h"
+#include "precompute/stored.h"
 #include "runtime/checks.h"
 #include "runtime/safetensors/safetensors_file.h"
 
@@ -143,33 +140,31 @@ static void add_reference(entries *list, const supine_reference *reference, cons
 }
 
 /* Add the constants of the expected position error (supine/locate.h). */
-static void add_expected_error(entries *list, const supine_basis_content *content) {
-  const supine_patient_record *record = content->prepared->patient;
-  const bool fitted = record != NULL && record->report.expected_constant > 0.0;
-  if (!content->is_fields) {
-    add(list, "expected_error_mm", "%g",
-        fitted ? supine_patient_expected(record) : SUPINE_EXPECTED_ERROR_MM);
+static void add_expected_error(entries *list, const supine_prepared *prepared) {
+  const supine_patient_record *record = prepared->patient;
+  if (record == NULL || record->report.expected_constant == 0.0) {
+    add(list, "expected_error_mm", "%g", SUPINE_EXPECTED_ERROR_MM);
+    return;
   }
-  if (fitted) {
-    add(list, "expected_error_from_mm", "%g", record->report.expected_from);
-    add(list, "expected_error_source", "%s", content->prepared->fit);
-  }
-  if (fitted && record->gain_fitted) {
+  add(list, "expected_error_mm", "%g", supine_patient_expected(record));
+  add(list, "expected_error_from_mm", "%g", record->report.expected_from);
+  add(list, "expected_error_source", "%s", prepared->fit);
+  if (record->gain_fitted) {
     add(list, "turn_fitted", "yes");
   }
 }
 
-static void add_fields(entries *list, const supine_basis_content *content,
+static void add_fields(entries *list, const double *scan_gravity, const supine_computed *computed,
                        const supine_simulated_volumes *simulated) {
-  const double *g = content->scan_gravity;
-  const supine_clusters *clusters = content->clusters;
+  const double *g = scan_gravity;
+  const supine_clusters *clusters = &computed->clusters;
   add(list, "route", "fields");
   add(list, "error_method", "leave-one-out");
-  if (content->compression->order > 0) {
+  if (computed->compression.order > 0) {
     add(list, "simulated_total_ml", "%.17g,%.17g", simulated->total[0], simulated->total[1]);
-    add(list, "simulated_runs", "%zu", content->fit->fields->run_count);
-    if (content->fit->report.extrapolated > 0.0) {
-      add(list, "error_extrapolated_percent", "%.6g", 100.0 * content->fit->report.extrapolated);
+    add(list, "simulated_runs", "%zu", computed->fit.fields->run_count);
+    if (computed->fit.report.extrapolated > 0.0) {
+      add(list, "error_extrapolated_percent", "%.6g", 100.0 * computed->fit.report.extrapolated);
     }
   }
   if (clusters->count > 0) {
@@ -213,103 +208,6 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
   }
 }
 
-static void to_float(const double *values, size_t count, float *out) {
-  for (size_t i = 0; i < count; ++i) {
-    out[i] = (float)values[i];
-  }
-}
-
-/* Arrays of a basis file, as they are stored. */
-typedef struct stored {
-  float *vertices;          /* [N, 3] */
-  float *directions;        /* [N, 3] of SCALAR rows, otherwise NULL */
-  unsigned char *lung;      /* [N] */
-  supine_compression field; /* coefficients for collapsed lungs */
-  supine_rows rows;         /* of `field`, in double precision */
-  supine_normals_modes normals;
-  supine_simulated_volumes simulated;                /* of fields over volume */
-  double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /* simulated.shares without gaps */
-  double named[2][2][9]; /* harmonics of rest and of full inflation, of fields over volume */
-  const double *rest,
-      *full;            /* [lungs, 9] harmonics of these volumes, mL above the surface; or NULL */
-  double *volume_range; /* [SUPINE_RANGE_NODES, lungs, 2] volumes without folds, mL, or NULL */
-} stored;
-
-/* Shrink the displacements of VECTOR rows in collapsed lungs to the cube root of the lung's share.
- */
-static void collapse_coefficients(const supine_lungs *lungs, const double share[2],
-                                  const supine_compression *field, float *coefficients) {
-  for (size_t i = 0; i < field->row_count; ++i) {
-    const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
-    const float factor = (float)cbrt(share[lung]);
-    for (size_t k = 0; k < field->mode_count; ++k) {
-      const size_t at = i * field->mode_count + k;
-      coefficients[at] = factor * field->coefficients[at];
-    }
-  }
-}
-
-/* Collapse the lungs and their displacements, and round them as in the file. */
-static supine_status store(const supine_basis_content *content, supine_arena *arena, stored *made,
-                           supine_error *error) {
-  const supine_lungs *lungs = content->lungs;
-  const double *share = content->prepared->model.share;
-  const size_t n = lungs->mesh.vertex_count;
-  const supine_compression *field = content->compression;
-  double *collapsed = supine_arena_take(arena, 3 * n, sizeof *collapsed);
-  *made = (stored){.vertices = supine_arena_take(arena, 3 * n, sizeof(float)),
-                   .lung = supine_arena_take(arena, n, 1),
-                   .rest = content->resting,
-                   .field = *field,
-                   .rows = content->rows};
-  SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-  supine_lungs_collapse(lungs, share, collapsed);
-  to_float(collapsed, 3 * n, made->vertices);
-  for (size_t i = 0; i < n; ++i) {
-    made->lung[i] = lungs->lung_count == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
-  }
-  if (content->rows.kind == SUPINE_ROWS_SCALAR) {
-    made->directions = supine_arena_take(arena, 3 * n, sizeof(float));
-    SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-    memcpy(collapsed, content->rows.directions, 3 * n * sizeof *collapsed);
-    supine_lungs_collapse_directions(lungs, share, collapsed);
-    to_float(collapsed, 3 * n, made->directions);
-    made->rows.directions = collapsed;
-  } else if (share[0] != 1.0 || share[1] != 1.0) {
-    made->field.coefficients =
-        supine_arena_take(arena, field->row_count * field->mode_count, sizeof(float));
-    SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-    collapse_coefficients(lungs, share, field, made->field.coefficients);
-  }
-  return SUPINE_OK;
-}
-
-/* Find the numbers by which a basis over volume finds its parameters. */
-static supine_status store_volumes(const supine_fit *fit, stored *made, supine_error *error) {
-  SUPINE_TRY(supine_fields_volumes_fit(fit, &made->simulated, error));
-  const size_t count = made->simulated.share_count;
-  for (size_t i = 0; i < 2 * 9 * count; ++i) {
-    made->shares[i] = made->simulated.shares[i / count / 9][i / count % 9][i % count];
-  }
-  return SUPINE_OK;
-}
-
-/* Find the modes of the vertex normals from vertices and displacements rounded as in the file. */
-static supine_status find_normals(const supine_basis_content *content, supine_arena *arena,
-                                  stored *made, supine_error *error) {
-  static const double straight[3] = {0.0, 0.0, 0.0};
-  const supine_normals_surface surface = {
-      .lungs = content->lungs,
-      .vertices = made->vertices,
-      .kind = made->rows.kind,
-      .directions = made->directions,
-      .field = &made->field,
-      .resting = content->resting,
-      .forms = content->forms,
-      .bend = content->reference != NULL ? content->prepared->model.bend : straight};
-  return supine_normals_modes_create(&surface, arena, &made->normals, error);
-}
-
 static void add_normals(entries *list, const supine_normals_modes *normals, bool rest_known) {
   if (normals->count > 0) {
     add(list, rest_known ? "normals_range_ml" : "normals_range_mm", "%.0f..%.0f", normals->range[0],
@@ -343,66 +241,65 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
 }
 
 /* Add all metadata in the file's order. */
-static void add_all(entries *list, const supine_basis_content *content, const stored *made) {
-  const double *share = content->prepared->model.share;
+static void add_all(entries *list, const supine_prepared *prepared,
+                    const supine_basis_choice *choice, const supine_computed *computed,
+                    const supine_stored *stored) {
+  const double *share = prepared->model.share;
+  const bool rest_known = computed->reference.known;
+  const bool by_model = computed->kind == SUPINE_COMPUTED_BY_MODEL;
   add(list, "format", "supine-basis");
   add(list, "version", "4");
-  add(list, "kind", "%s", content->rows.kind == SUPINE_ROWS_VECTOR ? "vector" : "scalar");
-  add(list, "band", "%zu", content->compression->band);
-  add(list, "modes", "%s", content->is_harmonics ? "harmonics" : "best");
-  add(list, "mode_count", "%zu", content->compression->mode_count);
+  add(list, "kind", "%s", stored->rows.kind == SUPINE_ROWS_VECTOR ? "vector" : "scalar");
+  add(list, "band", "%zu", stored->field.band);
+  add(list, "modes", "%s", choice->modes == 0 ? "harmonics" : "best");
+  add(list, "mode_count", "%zu", stored->field.mode_count);
   add(list, "units", "mm");
   add(list, "axes", "LPS");
-  add_lungs(list, content->lungs, share);
-  if (!content->is_fields) {
-    add_model(list, content->lungs, &content->prepared->model, content->reference != NULL);
+  add_lungs(list, &computed->lungs, share);
+  if (by_model) {
+    add_model(list, &computed->lungs, &prepared->model, rest_known);
+    if (rest_known) {
+      add_reference(list, &computed->reference, share);
+    }
+    add_expected_error(list, prepared);
+  } else {
+    add_fields(list, choice->scan_gravity, computed, &stored->simulated);
   }
-  if (content->reference != NULL) {
-    add_reference(list, content->reference, share);
+  add_accuracy(list, &computed->accuracy, rest_known);
+  if (by_model) {
+    add(list, "turned_over_percent", "%.3g", 100.0 * computed->turned_over);
   }
-  add_expected_error(list, content);
-  if (content->is_fields) {
-    add_fields(list, content, &made->simulated);
-  }
-  add_accuracy(list, content->accuracy, content->reference != NULL);
-  if (content->turned_over != NULL) {
-    add(list, "turned_over_percent", "%.3g", 100.0 * *content->turned_over);
-  }
-  add_texts(list, content->prepared);
-  add_normals(list, &made->normals, content->resting != NULL);
-  add(list, "made_by", "%s", content->made_by != NULL ? content->made_by : "supine_precompute");
+  add_texts(list, prepared);
+  add_normals(list, &stored->normals, rest_known);
+  add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
 enum { TENSORS_MAX = 22 };
 
-static void basis_close(supine_basis **basis) {
-  supine_basis_close(*basis);
-}
-
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
-static supine_tensor list_coefficients(const supine_basis_content *content, const stored *made) {
-  const size_t n = content->lungs->mesh.vertex_count;
-  const size_t k = made->field.mode_count;
-  const float *data = content->clusters->count > 0 ? NULL : made->field.coefficients;
-  if (content->rows.kind == SUPINE_ROWS_VECTOR) {
+static supine_tensor list_coefficients(const supine_computed *computed,
+                                       const supine_stored *stored) {
+  const size_t n = computed->lungs.mesh.vertex_count;
+  const size_t k = stored->field.mode_count;
+  const float *data = computed->clusters.count > 0 ? NULL : stored->field.coefficients;
+  if (stored->rows.kind == SUPINE_ROWS_VECTOR) {
     return (supine_tensor){"coefficients", SUPINE_F32, 3, {n, 3, k}, data};
   }
   return (supine_tensor){"coefficients", SUPINE_F32, 2, {n, k}, data};
 }
 
 /* List the tensors in the file's order; return their number. */
-static size_t list_tensors(const supine_basis_content *content, const stored *made,
+static size_t list_tensors(const supine_computed *computed, const supine_stored *made,
                            supine_tensor list[TENSORS_MAX]) {
-  static const supine_error_table no_table;
-  const supine_lungs *lungs = content->lungs;
+  const supine_lungs *lungs = &computed->lungs;
   const supine_compression *field = &made->field;
-  const supine_volume_forms *forms = content->forms;
-  const supine_error_table *table = content->table != NULL ? content->table : &no_table;
+  const supine_volume_forms *forms = &computed->forms;
+  const supine_error_table *table = &computed->table;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
   const size_t q = made->normals.count;
-  const supine_clusters *clusters = content->clusters;
+  const supine_clusters *clusters = &computed->clusters;
   const supine_simulated_volumes *s = &made->simulated;
   const bool simulated = field->order > 0;
   const supine_tensor all[TENSORS_MAX] = {
@@ -410,7 +307,7 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
       {"triangles", SUPINE_U32, 2, {lungs->mesh.triangle_count, 3}, lungs->mesh.triangles},
       {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
-      list_coefficients(content, made),
+      list_coefficients(computed, made),
       {"clusters", SUPINE_U16, 1, {n}, clusters->cluster},
       {"cluster_scalars", SUPINE_I16, 2, {n, 2}, clusters->scalars},
       {"cluster_vectors",
@@ -418,7 +315,7 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
        3,
        {clusters->count, k, SUPINE_CLUSTER_NUMBERS},
        clusters->vectors},
-      {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? content->fit->range : NULL},
+      {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? computed->fit.range : NULL},
       {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? s->limits : NULL},
       {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
@@ -432,8 +329,12 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
        SUPINE_F64,
        1,
        {table->band_count},
-       table == &no_table ? NULL : table->harmonics},
-      {"error_modes", SUPINE_F64, 1, {table->mode_count}, table == &no_table ? NULL : table->modes},
+       table->band_count > 0 ? table->harmonics : NULL},
+      {"error_modes",
+       SUPINE_F64,
+       1,
+       {table->mode_count},
+       table->mode_count > 0 ? table->modes : NULL},
       {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},
       {"normal_weights",
        SUPINE_F64,
@@ -450,13 +351,14 @@ static size_t list_tensors(const supine_basis_content *content, const stored *ma
 }
 
 /* Print the metadata and the tensors into memory. */
-static supine_status print_bytes(const supine_basis_content *content, const stored *made,
+static supine_status print_bytes(const supine_prepared *prepared, const supine_basis_choice *choice,
+                                 const supine_computed *computed, const supine_stored *stored,
                                  supine_bytes *bytes, supine_error *error) {
   SUPINE_ARENA arena = {0};
   entries list = {.memory = &arena};
   supine_tensor tensors[TENSORS_MAX];
-  const size_t count = list_tensors(content, made, tensors);
-  add_all(&list, content, made);
+  const size_t count = list_tensors(computed, stored, tensors);
+  add_all(&list, prepared, choice, computed, stored);
   SUPINE_TRY(supine_arena_check(&arena, error, "metadata of a basis"));
   FILE *file = open_memstream(&bytes->data, &bytes->size);
   if (file == NULL) {
@@ -470,118 +372,17 @@ static supine_status print_bytes(const supine_basis_content *content, const stor
   return SUPINE_OK;
 }
 
-/* Find the volume of each lung, as harmonics of the direction of gravity, where all lungs hold a
- * total volume: as the simulator divided it.
- * @param totals      [6] with gravity along +x, -x, +y, -y, +z, -z, mL
- * @param harmonics   [lungs] written, mL above the reference surface */
-static supine_status divide(const supine_basis *basis, const double totals[6], const char *what,
-                            double (*harmonics)[9], supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  double volume[2][6];
-  for (size_t axis = 0; axis < 6; ++axis) {
-    supine_state state = {.volume = {SUPINE_VOLUME_ABSOLUTE, totals[axis]}};
-    double held[SUPINE_LUNGS_MAX];
-    char text[160];
-    supine_pose pose;
-    supine_error inner;
-    state.gravity[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
-    (void)supine_state_describe(&state, text, sizeof text);
-    supine_status status = supine_basis_pose(basis, &state, &pose, &inner);
-    if (status != SUPINE_OK) {
-      return supine_error_wrap(error, &inner, "%s, %s: ", what, text);
-    }
-    SUPINE_TRY(supine_basis_volumes(basis, &pose, held));
-    for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      volume[lung][axis] = held[lung] - info->reference_volume[lung];
-    }
-  }
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    supine_physics_resting_harmonics(volume[lung], harmonics[lung]);
-  }
-  return SUPINE_OK;
-}
-
-/* Name rest and full inflation among the simulated volumes, where they are known. */
-static supine_status name_volumes(const supine_basis *basis, const supine_named_volumes *named,
-                                  stored *made, supine_error *error) {
-  const double full = named->full;
-  const double totals[6] = {full, full, full, full, full, full};
-  if (named->has_rest) {
-    SUPINE_TRY(divide(basis, named->rest,
-                      "volumes at rest (those not given are assumed from the others)",
-                      made->named[0], error));
-    made->rest = made->named[0][0];
-  }
-  if (full > 0.0) {
-    SUPINE_TRY(divide(basis, totals, "volume at full inflation", made->named[1], error));
-    made->full = made->named[1][0];
-  }
-  return SUPINE_OK;
-}
-
-/* Measure the error of the basis relative to what depends on gravity: the squared displacement
- * without that of band 0. A surface without area has none. */
-static supine_status measure_turning(const supine_basis *basis, supine_accuracy *accuracy,
-                                     supine_error *error) {
-  const size_t bands = supine_basis_get_info(basis)->band + 1;
-  double energy[SUPINE_SH_BAND_MAX + 1];
-  double turning = 0.0;
-  supine_compare *compare = NULL;
-  const supine_status status = supine_compare_create(basis, &compare, error);
-  if (status != SUPINE_OK) {
-    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
-  }
-  supine_compare_energy(compare, energy);
-  supine_compare_destroy(compare);
-  for (size_t l = 1; l < bands; ++l) {
-    turning += energy[l];
-  }
-  if (turning > 0.0) {
-    accuracy->turning_rms = accuracy->relative_rms * sqrt(1.0 + energy[0] / turning);
-  }
-  return SUPINE_OK;
-}
-
-/* Open the printed basis, add the error of storage to content->accuracy, and measure the volumes
- * that the lungs can hold, or those of rest and full inflation. */
-static supine_status measure_printed(const supine_basis_content *content, const supine_bytes *bytes,
-                                     supine_arena *arena, stored *made, supine_error *error) {
-  const supine_basis_options options = {
-      .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
-  SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
-  SUPINE_TRY(supine_basis_open_memory_with(bytes->data, bytes->size, &options, &basis, error));
-  supine_compression exact = made->field;
-  if (content->clusters->count > 0) {
-    exact.coefficients = (float *)(uintptr_t)content->exact; /* only read */
-  }
-  SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &made->rows, content->accuracy));
-  SUPINE_TRY(measure_turning(basis, content->accuracy, error));
-  if (content->compression->order > 0) { /* the simulations give the range of volumes */
-    return name_volumes(basis, &content->prepared->named, made, error);
-  }
-  if (content->resting == NULL) {
-    return SUPINE_OK;
-  }
-  made->volume_range = supine_arena_take(arena, SUPINE_RANGE_NODES * content->lungs->lung_count * 2,
-                                         sizeof *made->volume_range);
-  SUPINE_TRY(supine_arena_check(arena, error, "the range of volumes"));
-  return supine_precompute_volume_range(basis, made->volume_range, error);
-}
-
-supine_status supine_precompute_print(const supine_basis_content *content, supine_bytes *bytes,
-                                      supine_error *error) {
+supine_status supine_precompute_print(const supine_prepared *prepared,
+                                      const supine_basis_choice *choice, supine_computed *computed,
+                                      supine_bytes *bytes, supine_error *error) {
   SUPINE_ARENA arena = {0};
-  stored made;
-  SUPINE_TRY(store(content, &arena, &made, error));
-  if (content->compression->order > 0) {
-    SUPINE_TRY(store_volumes(content->fit, &made, error));
-  }
-  if (!content->without_normals && content->compression->order == 0) {
-    SUPINE_TRY(find_normals(content, &arena, &made, error));
-  }
-  SUPINE_TRY(print_bytes(content, &made, bytes, error));
-  SUPINE_TRY(measure_printed(content, bytes, &arena, &made, error));
+  supine_stored stored;
+  SUPINE_TRY(supine_precompute_store(prepared, choice, computed, &arena, &stored, error));
+  SUPINE_TRY(print_bytes(prepared, choice, computed, &stored, bytes, error));
+  SUPINE_TRY(supine_precompute_measure_stored(prepared, bytes->data, bytes->size, computed, &arena,
+                                              &stored, error));
   free(bytes->data);
   *bytes = (supine_bytes){0};
-  return print_bytes(content, &made, bytes, error); /* again, with what was measured */
+  return print_bytes(prepared, choice, computed, &stored, bytes,
+                     error); /* with what was measured */
 }

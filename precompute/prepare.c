@@ -374,9 +374,9 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes, sup
  * their volumes at full inflation. */
 static double rest_along(const supine_lungs *lungs, const supine_resting *resting,
                          const double *full, size_t axis) {
-  double g[3] = {0.0, 0.0, 0.0};
+  double g[3];
   double sum = 0.0;
-  g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+  supine_physics_resting_axis(axis, g);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     sum += full[lung] * supine_physics_resting_share(resting, lungs->side[lung], g);
   }
@@ -443,6 +443,9 @@ static supine_status read_knowledge(const supine_precompute_options *options, su
       SUPINE_TRY(supine_physics_resting_give(&known->resting, axis, rest->ml, rest->share, error));
     }
   }
+  SUPINE_REFUSE_IF(options->fields != NULL && options->patient != NULL, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "displacement fields and a patient's model were given: leave one of them out");
   if (options->fields != NULL) { /* they displace the surface as it is */
     SUPINE_REFUSE_IF(has_state && options->scan.state.volume.kind != SUPINE_VOLUME_DEFAULT, error,
                      SUPINE_ERROR_ARGUMENT,

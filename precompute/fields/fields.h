@@ -133,4 +133,15 @@ typedef struct supine_simulated_volumes {
 supine_status supine_fields_volumes_fit(const supine_fit *fit, supine_simulated_volumes *made,
                                         supine_error *error);
 
+/** Find the volume of each lung where all lungs hold a total volume, as the simulator divided it.
+ * @param basis      of fields over volume
+ * @param totals     [6] total volumes with gravity along +x, -x, +y, -y, +z, -z, mL
+ * @param name       of these volumes, for messages
+ * @param harmonics  [lungs] written: volumes as harmonics of the direction of gravity, mL above the
+ *   reference surface
+ * @return the status of supine_basis_pose: a total was not simulated */
+supine_status supine_fields_divide_volume(const supine_basis *basis, const double totals[6],
+                                          const char *name, double (*harmonics)[9],
+                                          supine_error *error);
+
 #endif

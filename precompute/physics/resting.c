@@ -228,6 +228,13 @@ double supine_physics_resting_full_share(const double g[3]) {
   return 1.0 + SUPINE_FULL_UPRIGHT_GAIN * up * up;
 }
 
+void supine_physics_resting_axis(size_t axis, double g[3]) {
+  g[0] = 0.0;
+  g[1] = 0.0;
+  g[2] = 0.0;
+  g[axis / 2] = axis % 2 == 0 ? 1.0 : -1.0;
+}
+
 double supine_physics_resting_along_axes(const double values[6], const double g[3]) {
   double value = 0.0;
   for (size_t k = 0; k < 3; ++k) {

@@ -95,6 +95,9 @@ double supine_physics_resting_full_share(const double g[3]);
  * g. Assume that the left lung has the share SUPINE_LEFT_SHARE of the reference volume. */
 double supine_physics_resting_total(const supine_resting *resting, const double g[3]);
 
+/** Write the direction of gravity along axis 0 to 5, which are +x, -x, +y, -y, +z, -z. */
+void supine_physics_resting_axis(size_t axis, double g[3]);
+
 /** Interpolate values v, given along +x, -x, +y, -y, +z, -z, at the unit vector g. Return
  *
  *     sum over k = x, y, z of [(v(+k) - v(-k)) g_k + (v(+k) + v(-k)) g_k^2] / 2 */

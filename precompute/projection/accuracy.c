@@ -11,6 +11,7 @@
 #include "base/clones.h"
 #include "base/parallel.h"
 #include "base/vec3.h"
+#include "precompute/physics/resting.h"
 #include "precompute/projection/accuracy.h"
 #include <supine/runtime.h>
 #include <supine/sh.h>
@@ -228,11 +229,11 @@ supine_status supine_projection_turned_over(const supine_lungs *lungs, const sup
            3 * sizeof *sample.triangles);
   }
   for (size_t posture = 0; posture < 6; ++posture) {
-    double g[3] = {0.0, 0.0, 0.0};
+    double g[3];
     double weights[SUPINE_MODES_MADE_MAX];
     double cubic[3];
     double scale = 0.0;
-    g[posture / 2] = posture % 2 == 0 ? 1.0 : -1.0;
+    supine_physics_resting_axis(posture, g);
     supine_sh_compression_weights(compression, g, weights);
     supine_physics_volume_forms_contract(forms, weights, cubic);
     if (supine_volume_scale(cubic, volume_along(volume, g), &scale, NULL) != SUPINE_OK) {
