@@ -13,7 +13,7 @@ cd "$(dirname "$0")/.."
 
 # Packages needed to build, by the quick tests, by all tests, and by those of other platforms.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
-  libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libwebp-dev
+  libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libpango1.0-dev libwebp-dev
   libwebsockets-dev libnifti2-dev zlib1g-dev libdeflate-dev
   libmeshoptimizer-dev help2man"
 quick="g++ libegl-dev libgles-dev libgl1-mesa-dri libcmocka-dev libopenigtlink-dev mono-mcs mono-runtime

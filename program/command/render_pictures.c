@@ -32,8 +32,9 @@ typedef struct film {
 typedef struct drawn {
   supine_pose pose;
   float *value; /* [N] length of the displacement, mm */
+  char figure[32];
   char subtitle[160];
-  char note[48];
+  char note[128];
   supine_options_marks marks;
 } drawn;
 
@@ -46,6 +47,8 @@ typedef struct studio {
   supine_compare *compare;
   supine_basis *inside; /* NULL if there are no structures inside the lungs */
   supine_options_names names;
+  double *score; /* [names.count] of supine_options_targets_score, over all panels and frames */
+  char legend[128];
   supine_posture_list postures; /* posture of each panel */
   drawn shown[SUPINE_PANELS_MAX];
   supine_panel panel[SUPINE_PANELS_MAX];
@@ -72,6 +75,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   if (s->wanted->inside != NULL) {
     SUPINE_TRY(
         supine_options_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
+    s->score = supine_arena_zeros(&s->arena, s->names.count, sizeof *s->score);
   }
   const size_t n = supine_basis_get_info(s->basis)->vertex_count;
   for (size_t i = 0; i < s->postures.count; ++i) {
@@ -102,33 +106,94 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   return SUPINE_OK;
 }
 
+/* Compute the expected errors of panel i: of the structures inside the lungs, else of the surface. */
+static supine_status expect(const studio *s, size_t i, supine_expected *expected,
+                            supine_error *error) {
+  return supine_posed_expected(s->inside != NULL ? s->inside : s->basis,
+                               &s->postures.item[i].state, &s->from.state, expected, error);
+}
+
+/* Raise the scores of the targets to those of panel i, after fill_panel. */
+static supine_status score_panel(studio *s, size_t i, supine_error *error) {
+  const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
+  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
+  if (s->inside != NULL) {
+    SUPINE_TRY(expect(s, i, &expected, error));
+    SUPINE_TRY(supine_options_targets_find(s->inside, &s->names, pose, expected.sigma, false,
+                                           &targets, error));
+    supine_options_targets_score(targets, s->names.count, s->score);
+  }
+  return SUPINE_OK;
+}
+
+/* Write the caption of panel i about the selected target: how far it goes, the expected error, and
+ * where to. */
+static void tell_target(studio *s, size_t i) {
+  drawn *shown = &s->shown[i];
+  const supine_target *t = &shown->marks.selected;
+  char target[40];
+  shown->note[0] = '\0';
+  if (t->moved < 0.05) {
+    (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "where %s is",
+                            supine_text_shorten(t->name, sizeof target, target));
+    return;
+  }
+  (void)supine_print_text(shown->figure, sizeof shown->figure, "%.1f mm", t->moved);
+  s->panel[i].figure = shown->figure;
+  if (isnan(t->expected)) {
+    (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "error unknown");
+  } else {
+    (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "\302\261 %.1f expected",
+                            t->expected);
+  }
+  if (t->moved <= t->expected) {
+    (void)supine_print_text(shown->note, sizeof shown->note, "no change that the model can tell");
+  } else {
+    (void)supine_options_target_way(t, 2, shown->note);
+  }
+}
+
 /* Add the expected error to panel i, and marks of the structures inside the lungs, if any. Call
- * this after fill_panel. */
+ * this after fill_panel, and after score_panel for all panels. */
 static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   drawn *shown = &s->shown[i];
   const supine_pose *const pose[2] = {&s->from.pose, &shown->pose};
   SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(supine_posed_expected(s->inside != NULL ? s->inside : s->basis,
-                                   &s->postures.item[i].state, &s->from.state, &expected, error));
-  double sigma = expected.sigma != NULL && expected.rms >= 0.05 ? expected.rms : NAN;
-  if (s->inside != NULL) {
-    s->panel[i].marks = &shown->marks.marks;
-    SUPINE_TRY(supine_options_marks_make(s->inside, &s->names, pose, expected.sigma, &shown->marks,
-                                         error));
-    const supine_target *t = &shown->marks.first;
-    char way[96];
-    char target[40];
-    const bool still = t->moved < 0.05;
-    (void)supine_print_text(
-        shown->subtitle, sizeof shown->subtitle, still ? "the reference" : "%s: %s",
-        supine_text_shorten(t->name, sizeof target, target), supine_options_target_way(t, 2, way));
-    s->panel[i].about_target = !still;
-    sigma = still ? NAN : t->expected;
+  SUPINE_TRY(expect(s, i, &expected, error));
+  shown->note[0] = '\0';
+  if (s->inside == NULL) {
+    if (expected.sigma != NULL && expected.rms >= 0.05) {
+      (void)supine_print_text(shown->note, sizeof shown->note, "expected error %.1f mm",
+                              expected.rms);
+    }
+    return SUPINE_OK;
   }
-  if (!isnan(sigma)) {
-    (void)supine_print_text(shown->note, sizeof shown->note, "expected error %.1f mm", sigma);
+  s->panel[i].marks = &shown->marks.marks;
+  SUPINE_TRY(supine_options_marks_make(s->inside, &s->names, pose, expected.sigma, s->score,
+                                       &shown->marks, error));
+  if (shown->marks.selected.name != NULL) {
+    tell_target(s, i);
   }
   return SUPINE_OK;
+}
+
+/* Write what the signs of a picture with targets mean. */
+static void write_legend(studio *s) {
+  const size_t unnamed = s->shown[0].marks.unnamed;
+  s->legend[0] = '\0';
+  if (s->inside != NULL) {
+    supine_text_add(s->legend, sizeof s->legend, "dashed: %s \302\267 ring: within the expected error",
+                    s->from.name);
+  }
+  if (s->wanted->view[0] == SUPINE_VIEW_LYING) {
+    supine_text_add(s->legend, sizeof s->legend, "%sgravity points down",
+                    s->inside != NULL ? " \302\267 " : "");
+  }
+  if (unnamed > 0) {
+    supine_text_add(s->legend, sizeof s->legend, " \302\267 and %zu more target%s", unnamed,
+                    unnamed == 1 ? "" : "s");
+  }
 }
 
 static supine_picture make_picture(studio *s) {
@@ -141,6 +206,8 @@ static supine_picture make_picture(studio *s) {
                           .view = s->view,
                           .view_count = wanted->view_count,
                           .bar_label = s->label,
+                          .legend = s->legend,
+                          .remark = "computed, not measured",
                           .colours = SUPINE_COLOURS_DISPLACEMENT,
                           .largest = largest,
                           .beyond = s->max > largest,
@@ -153,8 +220,12 @@ static supine_picture make_picture(studio *s) {
 static supine_status draw_postures(studio *s, supine_error *error) {
   for (size_t i = 0; i < s->postures.count; ++i) {
     SUPINE_TRY(fill_panel(s, i, error));
+    SUPINE_TRY(score_panel(s, i, error));
+  }
+  for (size_t i = 0; i < s->postures.count; ++i) {
     SUPINE_TRY(mark_panel(s, i, error));
   }
+  write_legend(s);
   const supine_picture picture = make_picture(s);
   SUPINE_TRY(supine_render_picture_save(s->basis, &picture, s->wanted->output, error));
   (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
@@ -228,6 +299,7 @@ static supine_status add_frames(studio *s, const film *shot, size_t count,
   for (moment m = {0}; next_moment(shot, &m);) {
     SUPINE_TRY(find_frame(s, shot, &m, error));
     SUPINE_TRY(mark_panel(s, 0, error));
+    write_legend(s);
     supine_picture picture = make_picture(s);
     picture.extent = extent;
     SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
@@ -260,6 +332,7 @@ static supine_status draw_film(studio *s, const film *shot, supine_error *error)
   }
   for (moment m = {0}; next_moment(shot, &m);) {
     SUPINE_TRY(find_frame(s, shot, &m, error));
+    SUPINE_TRY(score_panel(s, 0, error));
     const supine_picture picture = make_picture(s);
     supine_render_picture_extent(s->basis, &picture, extent);
   }

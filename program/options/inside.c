@@ -257,41 +257,110 @@ size_t supine_options_targets_first(const supine_target *targets, size_t count) 
   return first;
 }
 
-/* Make the marks of a structure: of its vertices, and of its middle, which has the label. */
-static void fill_marks(const supine_options_names *names, size_t part, const supine_target *t,
-                       const float *after, const float *before, supine_options_marks *marks) {
-  static const float point_radius = 7.0F; /* radius of the ball of a single point, mm */
-  static const float cloud_radius = 1.5F; /* of each of several points of one name, mm */
-  static const double least = 0.05;       /* smallest displacement that is shown, mm */
-  const size_t count = names->begin[part + 1] - names->begin[part];
-  for (size_t i = names->begin[part]; i < names->begin[part + 1]; ++i) {
-    const size_t vertex = names->order[i];
-    supine_mark *mark = &marks->mark[vertex];
-    memcpy(mark->xyz, after + 3 * vertex, sizeof mark->xyz);
-    memcpy(mark->from, before + 3 * vertex, sizeof mark->from);
-    mark->radius = count == 1 ? point_radius : cloud_radius;
-    mark->anatomy = t->anatomy;
-    mark->moved = t->moved >= least;
+void supine_options_targets_score(const supine_target *targets, size_t count, double *score) {
+  for (size_t i = 0; i < count; ++i) {
+    const supine_target *t = &targets[i];
+    const double own = t->expected > 0.0 ? t->moved / t->expected : t->moved;
+    score[i] = t->anatomy ? -1.0 : fmax(score[i], own);
   }
-  if (count == 0 || t->anatomy) {
-    return;
+}
+
+/* Return how many structures have a larger score than structure `part`. */
+static size_t rank_of(const double *score, size_t count, size_t part) {
+  size_t above = 0;
+  for (size_t i = 0; i < count; ++i) {
+    above += score[i] > score[part] || (i < part && score[i] == score[part]);
   }
+  return above;
+}
+
+/* How a structure is shown. */
+typedef struct appearance {
+  size_t part; /* its index in the names */
+  supine_mark_kind kind;
+  size_t tint;
+  bool named;
+} appearance;
+
+/* Make the label of a structure, at its middle. */
+static void add_label(const appearance *look, const supine_target *t, supine_options_marks *marks) {
   supine_mark *middle = &marks->mark[marks->marks.count++];
+  char label[32];
   for (size_t k = 0; k < 3; ++k) {
     middle->xyz[k] = (float)t->at[k];
     middle->from[k] = (float)(t->at[k] - t->move[k]);
   }
-  char label[32];
-  (void)supine_print_text(marks->label[part], sizeof marks->label[part],
-                          t->moved <= t->expected ? "%s" : "%s %.1f mm",
-                          supine_text_shorten(t->name, sizeof label, label), t->moved);
-  middle->label = marks->label[part];
+  (void)supine_print_text(marks->label[look->part], sizeof marks->label[look->part], "%s",
+                          supine_text_shorten(t->name, sizeof label, label));
+  if (t->moved > t->expected && look->kind == SUPINE_MARK_TARGET) {
+    /* A mark from left to right keeps the number behind a name in Arabic or Hebrew. */
+    supine_text_add(marks->label[look->part], sizeof marks->label[look->part], "%s %.1f mm",
+                    supine_render_shapes_text() ? "\342\200\216" : "", t->moved);
+  }
+  middle->label = marks->label[look->part];
+  middle->kind = look->kind;
+  middle->moved = t->moved > t->expected || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
+  middle->expected = t->expected > 0.0 && t->moved >= 0.05 ? (float)t->expected : 0.0F;
+}
+
+/* Make the marks of a structure: of its vertices, and of its middle, which has the label. */
+static void fill_marks(const supine_options_names *names, const appearance *look,
+                       const supine_target *t, const float *after, const float *before,
+                       supine_options_marks *marks) {
+  static const float point_radius = 7.0F; /* radius of the ball of a single point, mm */
+  static const float cloud_radius = 1.5F; /* of each of several points of one name, mm */
+  static const double least = 0.05;       /* smallest displacement that is shown, mm */
+  const size_t begin = names->begin[look->part];
+  const size_t count = names->begin[look->part + 1] - begin;
+  double reach = count == 1 ? (double)point_radius : 0.0;
+  for (size_t i = begin; i < begin + count; ++i) {
+    const size_t vertex = names->order[i];
+    supine_mark *mark = &marks->mark[vertex];
+    memcpy(mark->xyz, after + 3 * vertex, sizeof mark->xyz);
+    memcpy(mark->from, before + 3 * vertex, sizeof mark->from);
+    const double off[3] = {(double)mark->xyz[0] - t->at[0], (double)mark->xyz[1] - t->at[1],
+                           (double)mark->xyz[2] - t->at[2]};
+    reach = fmax(reach, supine_length(off));
+    mark->radius = count == 1 ? point_radius : cloud_radius;
+    mark->kind = look->kind;
+    mark->tint = look->tint;
+    mark->moved = t->moved >= least;
+  }
+  if (count > 0 && look->named) {
+    marks->mark[marks->marks.count].reach = (float)reach;
+    add_label(look, t, marks);
+  }
+}
+
+/* Choose how each structure is shown, and make its marks. */
+static void show_structures(const supine_options_names *names, const supine_target *targets,
+                            const double *score, const float *after, const float *before,
+                            supine_options_marks *marks) {
+  size_t tint = 0;
+  for (size_t part = 0; part < names->count; ++part) {
+    const supine_target *t = &targets[part];
+    const size_t rank = rank_of(score, names->count, part);
+    appearance look = {.part = part, .kind = SUPINE_MARK_TARGET};
+    if (t->anatomy) {
+      look.kind = SUPINE_MARK_ANATOMY;
+      look.tint = tint++;
+    } else if (rank == 0) {
+      look.kind = SUPINE_MARK_SELECTED;
+    }
+    look.named = !t->anatomy && rank < SUPINE_LABELS_MAX;
+    marks->unnamed += !t->anatomy && !look.named;
+    fill_marks(names, &look, t, after, before, marks);
+    if (rank == 0) {
+      marks->selected = *t;
+    }
+  }
 }
 
 supine_status supine_options_marks_make(const supine_basis *inside,
                                         const supine_options_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
-                                        supine_options_marks *marks, supine_error *error) {
+                                        const double *score, supine_options_marks *marks,
+                                        supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   SUPINE_ARENA arena = {0};
@@ -308,13 +377,10 @@ supine_status supine_options_marks_make(const supine_basis *inside,
   (void)supine_deform(inside, pose[1], xyz);
   marks->marks = (supine_marks){n, marks->mark, info->triangle_count, info->triangles};
   (void)supine_deform(inside, pose[0], before);
-  for (size_t part = 0; part < names->count; ++part) {
-    fill_marks(names, part, &targets[part], xyz, before, marks);
-  }
+  show_structures(names, targets, score, xyz, before, marks);
   for (size_t i = 0; i < 3 * info->triangle_count; ++i) {
     marks->mark[info->triangles[i]].radius = 0.0F; /* corners of meshes are not drawn as balls */
   }
-  marks->first = targets[supine_options_targets_first(targets, names->count)];
   return SUPINE_OK;
 }
 

@@ -74,22 +74,32 @@ void supine_options_target_shift(supine_target *target, const double shift[3]);
 /* Return a target as JSON: its name, displacement, and the expected error. */
 json_t *supine_options_target_json(const supine_target *target);
 
+enum { SUPINE_LABELS_MAX = 8 }; /* largest number of targets that a picture names */
+
+/* Raise score[i] to the displacement of target i, in multiples of its expected error or, where that
+ * is unknown, in mm. That of anatomy becomes -1.
+ * @param score  [count] of several states; begin with zeros */
+void supine_options_targets_score(const supine_target *targets, size_t count, double *score);
+
 /* Marks of a picture: the vertices of each structure, and a label with name and displacement. */
 typedef struct supine_options_marks {
   supine_marks marks;
   supine_mark *mark;
   char (*label)[64];
-  supine_target first; /* the structure of which a caption tells */
+  supine_target selected; /* the target with the largest score, of which a caption tells */
+  size_t unnamed;         /* number of targets without a label */
   supine_arena arena;
 } supine_options_marks;
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
- * Those that `marks` held before are freed.
- * @param sigma  [N] expected error of each vertex, mm; NULL if unknown */
+ * Those that `marks` held before are freed. Names of up to SUPINE_LABELS_MAX targets are written.
+ * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
+ * @param score  [names->count] of supine_options_targets_score */
 supine_status supine_options_marks_make(const supine_basis *inside,
                                         const supine_options_names *names,
                                         const supine_pose *const pose[2], const float *sigma,
-                                        supine_options_marks *marks, supine_error *error);
+                                        const double *score, supine_options_marks *marks,
+                                        supine_error *error);
 void supine_options_marks_free(supine_options_marks *marks);
 
 #endif

@@ -211,7 +211,7 @@ TEST(test_project_outer_vertices_match_drawing) {
   const double weights[5] = {0};
   const double scales[2] = {1, 1};
   supine_mark *mark = calloc(info->vertex_count, sizeof *mark);
-  double(*at)[2] = calloc(info->vertex_count, sizeof *at);
+  double(*at)[3] = calloc(info->vertex_count, sizeof *at);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     memcpy(mark[i].xyz, info->vertices + 3 * i, sizeof mark[i].xyz);
   }

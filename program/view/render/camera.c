@@ -128,13 +128,14 @@ static void project(const camera *c, const double p[3], double at[2]) {
 }
 
 void supine_render_project(const supine_basis *basis, const supine_scene *scene,
-                           const supine_marks *marks, bool from, double (*pixel)[2]) {
+                           const supine_marks *marks, bool from, double (*pixel)[3]) {
   camera c = supine_render_camera(supine_basis_get_info(basis), scene);
   supine_render_camera_aim(&c, basis, scene, (double)scene->width, (double)scene->height);
   for (size_t i = 0; i < marks->count; ++i) {
     double p[3];
     place(&c, from ? marks->mark[i].from : marks->mark[i].xyz, p);
     project(&c, p, pixel[i]);
+    pixel[i][2] = 0.5 * c.size[1] * c.frame[3] * c.away / (c.away - p[2]);
   }
 }
 

@@ -3,6 +3,7 @@
 #ifndef SUPINE_RENDER_CANVAS_H
 #define SUPINE_RENDER_CANVAS_H
 
+#include "base/arena.h"
 #include "program/view/render/render.h"
 
 enum { OVERSAMPLE = 2 }; /* each pixel is the mean of OVERSAMPLE x OVERSAMPLE samples */
@@ -44,7 +45,10 @@ typedef enum material {
   MATERIAL_SHELL,   /* lungs as a translucent shell, lit at the rim */
   MATERIAL_GHOST,   /* a target where it was: white, translucent */
   MATERIAL_TARGET,  /* opaque */
-  MATERIAL_ANATOMY, /* opaque */
+  MATERIAL_SELECTED, /* opaque */
+  MATERIAL_ANATOMY,  /* a translucent shell in one of the tints */
+  MATERIAL_DOT,      /* a point of anatomy: opaque, in one of the tints */
+  MATERIAL_BODY      /* the torso, behind all else */
 } material;
 
 /* A point of a surface that covers a sample. */
@@ -54,6 +58,7 @@ typedef struct fragment {
   float value;     /* as in corner */
   float height;    /* as in corner */
   float contour;   /* share of the sample that contour lines cover, 0 to 1 */
+  size_t tint;     /* index of the colour of anatomy */
 } fragment;
 
 enum { SHADES = 4096 };
@@ -64,6 +69,18 @@ typedef struct shades {
   float encode[SHADES + 1];     /* [i] sRGB of the linear light i / SHADES, 0 to 1 */
   float largest;                /* value that the last colour shows, mm */
 } shades;
+
+/* The surface of a torso around the lungs. */
+typedef struct body {
+  size_t vertex_count, triangle_count;
+  float *xyz;          /* [vertex_count, 3] mm */
+  float *normals;      /* [vertex_count, 3] */
+  uint32_t *triangles; /* [triangle_count, 3] */
+} body;
+
+/* Make the torso of a patient with these lungs, in memory of `keep`. */
+supine_status supine_render_body(const supine_basis_info *info, supine_arena *keep, body *made,
+                                 supine_error *error);
 
 void supine_render_shades(const supine_scene *scene, shades *made);
 /* Compute the colour of a fragment: premultiplied RGB and coverage, 0 to 1. */

@@ -15,7 +15,13 @@ enum { SIDE_MAX = 16384, ROWS_PER_JOB = 16 };
 static const float ball_pixels = 4.0F; /* smallest radius of a ball, pixels */
 
 /* Surfaces that are drawn. */
-typedef enum layer_name { LAYER_LUNGS, LAYER_NOW, LAYER_BEFORE, LAYER_COUNT } layer_name;
+typedef enum layer_name {
+  LAYER_LUNGS,
+  LAYER_NOW,
+  LAYER_BEFORE,
+  LAYER_BODY,
+  LAYER_COUNT
+} layer_name;
 
 typedef struct layer {
   const corner *corners;
@@ -132,16 +138,34 @@ static fragment fragment_at(const face *f, const float share[3]) {
   return at;
 }
 
-/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them. */
+/* What a surface is painted with. */
+typedef struct paint {
+  material what;
+  size_t tint; /* index of the colour of anatomy */
+} paint;
+
+/* Return how much of the torso is seen at a sample, 0 to 1: it fades towards the picture's edges, so
+ * that it is not cut off there. */
+static float fade_at(const canvas *c, size_t sample) {
+  static const float share = 0.18F; /* part of the width and the height over which it fades */
+  const float x = ((float)(sample % c->width) + 0.5F) / (float)c->width;
+  const float y = ((float)(sample / c->width) + 0.5F) / (float)c->height;
+  return smoothstep(0.0F, share, fminf(x, 1.0F - x)) * smoothstep(0.0F, share, fminf(y, 1.0F - y));
+}
+
+/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them; of the
+ * torso, which is drawn first, only the nearest fragment stays. */
 static void blend(const canvas *c, size_t sample, material what, const fragment *at,
                   float nearness) {
   float rgba[4];
   float *under = c->rgba[sample];
+  const bool torso = what == MATERIAL_BODY;
+  const float fade = torso ? fade_at(c, sample) : 1.0F;
   supine_render_shade(c->shades, what, at, rgba);
   for (int k = 0; k < 4; ++k) {
-    under[k] = rgba[k] + (1.0F - rgba[3]) * under[k];
+    under[k] = torso ? fade * rgba[k] : rgba[k] + (1.0F - rgba[3]) * under[k];
   }
-  if (rgba[3] >= 1.0F) {
+  if (torso || rgba[3] >= 1.0F) {
     c->nearness[sample] = nearness;
   }
 }
@@ -160,7 +184,7 @@ static bool samples_of(const canvas *c, const rows *drawn, const float edge[4], 
   return true;
 }
 
-static void draw_triangle(const canvas *c, const layer *from, size_t triangle, material what,
+static void draw_triangle(const canvas *c, const layer *from, size_t triangle, paint with,
                           const rows *drawn) {
   const face f = face_of(from, triangle);
   const corner *a = f.at[0];
@@ -183,17 +207,18 @@ static void draw_triangle(const canvas *c, const layer *from, size_t triangle, m
       if (share[0] >= 0.0F && share[1] >= 0.0F && share[2] >= 0.0F &&
           nearness > c->nearness[sample]) {
         fragment seen = fragment_at(&f, share);
-        if (what == MATERIAL_MAP) {
+        seen.tint = with.tint;
+        if (with.what == MATERIAL_MAP) {
           seen.contour = contour(&f, at[0], at[1], seen.value, c->line_step);
         }
-        blend(c, sample, what, &seen, nearness);
+        blend(c, sample, with.what, &seen, nearness);
       }
     }
   }
 }
 
 /* Draw a ball around a corner; in the picture it is a disc. */
-static void draw_ball(const canvas *c, const corner *centre, float mm, material what,
+static void draw_ball(const canvas *c, const corner *centre, float mm, paint with,
                       const rows *drawn) {
   const float scale = supine_render_camera_scale(&c->camera, centre);
   const float radius = fmaxf(mm * scale, OVERSAMPLE * ball_pixels);
@@ -211,46 +236,83 @@ static void draw_ball(const canvas *c, const corner *centre, float mm, material 
       const size_t sample = y * c->width + x;
       if (square <= 1.0F) {
         fragment seen = {.normal = {off[0], off[1], sqrtf(1.0F - square)},
-                         .eye = {0.0F, 0.0F, 1.0F}};
+                         .eye = {0.0F, 0.0F, 1.0F},
+                         .tint = with.tint};
         const float depth = 1.0F / centre->nearness - seen.normal[2] * radius / scale;
         if (1.0F / depth > c->nearness[sample]) {
-          blend(c, sample, what, &seen, 1.0F / depth);
+          blend(c, sample, with.what, &seen, 1.0F / depth);
         }
       }
     }
   }
 }
 
+/* Return how the opaque parts of a structure are drawn. */
 static material solid_of(const supine_mark *mark) {
-  return mark->anatomy ? MATERIAL_ANATOMY : MATERIAL_TARGET;
+  switch (mark->kind) {
+  case SUPINE_MARK_SELECTED:
+    return MATERIAL_SELECTED;
+  case SUPINE_MARK_ANATOMY:
+    return MATERIAL_DOT;
+  case SUPINE_MARK_TARGET:
+    break;
+  }
+  return MATERIAL_TARGET;
 }
 
-/* Draw the structures inside the lungs where they are now. */
-static void draw_content(const canvas *c, const rows *drawn) {
+/* Draw the opaque parts of the structures inside the lungs where they are now: all balls, and the
+ * meshes, without those of anatomy if they are drawn as shells. */
+static void draw_content(const canvas *c, bool shells, const rows *drawn) {
   const supine_marks *marks = c->scene->content;
   const layer *now = &c->layers[LAYER_NOW];
   for (size_t t = 0; t < now->triangle_count; ++t) {
-    draw_triangle(c, now, t, solid_of(&marks->mark[now->triangles[3 * t]]), drawn);
+    const supine_mark *mark = &marks->mark[now->triangles[3 * t]];
+    if (mark->kind != SUPINE_MARK_ANATOMY || !shells) {
+      draw_triangle(c, now, t, (paint){solid_of(mark), mark->tint}, drawn);
+    }
   }
   for (size_t i = 0; marks != NULL && i < marks->count; ++i) {
-    if (marks->mark[i].radius > 0.0F) {
-      draw_ball(c, &now->corners[i], marks->mark[i].radius, solid_of(&marks->mark[i]), drawn);
+    const supine_mark *mark = &marks->mark[i];
+    if (mark->radius > 0.0F) {
+      draw_ball(c, &now->corners[i], mark->radius, (paint){solid_of(mark), mark->tint}, drawn);
     }
   }
 }
 
-/* Draw a translucent shell of the lungs, what is inside, and ghosts of the targets. */
+/* Return what a translucent triangle or ball of a layer is painted with. */
+static paint paint_of(const canvas *c, const item *it) {
+  if (it->layer == LAYER_LUNGS) {
+    return (paint){MATERIAL_SHELL, 0};
+  }
+  if (it->layer == LAYER_BEFORE) {
+    return (paint){MATERIAL_GHOST, 0};
+  }
+  const uint32_t first = c->layers[LAYER_NOW].triangles[3 * (size_t)it->index];
+  return (paint){MATERIAL_ANATOMY, c->scene->content->mark[first].tint};
+}
+
+static void forget_depth(const canvas *c, const rows *drawn) {
+  memset(c->nearness + drawn->begin * c->width, 0,
+         (drawn->end - drawn->begin) * c->width * sizeof *c->nearness);
+}
+
+/* Draw a translucent shell of the lungs, what is inside, and ghosts of the targets, in front of the
+ * torso. */
 static void draw_shell(const canvas *c, const rows *drawn) {
-  draw_content(c, drawn);
+  const layer *torso = &c->layers[LAYER_BODY];
+  for (size_t t = 0; t < torso->triangle_count; ++t) {
+    draw_triangle(c, torso, t, (paint){MATERIAL_BODY, 0}, drawn);
+  }
+  forget_depth(c, drawn);
+  draw_content(c, true, drawn);
   for (size_t i = 0; i < c->item_count; ++i) {
     const item *it = &c->items[i];
     const layer *from = &c->layers[it->layer];
-    const material what = it->layer == LAYER_LUNGS ? MATERIAL_SHELL : MATERIAL_GHOST;
     if (it->ball) {
-      draw_ball(c, &from->corners[it->index], c->scene->content->mark[it->index].radius, what,
-                drawn);
+      draw_ball(c, &from->corners[it->index], c->scene->content->mark[it->index].radius,
+                paint_of(c, it), drawn);
     } else {
-      draw_triangle(c, from, it->index, what, drawn);
+      draw_triangle(c, from, it->index, paint_of(c, it), drawn);
     }
   }
 }
@@ -259,11 +321,10 @@ static void draw_shell(const canvas *c, const rows *drawn) {
 static void draw_map(const canvas *c, const rows *drawn) {
   const layer *lungs = &c->layers[LAYER_LUNGS];
   for (size_t t = 0; t < lungs->triangle_count; ++t) {
-    draw_triangle(c, lungs, t, MATERIAL_MAP, drawn);
+    draw_triangle(c, lungs, t, (paint){MATERIAL_MAP, 0}, drawn);
   }
-  memset(c->nearness + drawn->begin * c->width, 0,
-         (drawn->end - drawn->begin) * c->width * sizeof *c->nearness);
-  draw_content(c, drawn);
+  forget_depth(c, drawn);
+  draw_content(c, false, drawn);
 }
 
 /* Return the mean of a pixel's samples as premultiplied ARGB; samples without lungs count as 0. */
@@ -341,6 +402,21 @@ static supine_status add_lungs(canvas *c, const supine_basis *basis, supine_aren
   return SUPINE_OK;
 }
 
+/* Project the torso of the patient. */
+static supine_status add_body(canvas *c, const supine_basis_info *info, supine_arena *keep,
+                              supine_error *error) {
+  body made;
+  SUPINE_TRY(supine_render_body(info, keep, &made, error));
+  corner *corners = supine_arena_take(keep, made.vertex_count, sizeof *corners);
+  SUPINE_TRY(supine_arena_check(keep, error, "%zu vertices", made.vertex_count));
+  for (size_t i = 0; i < made.vertex_count; ++i) {
+    corners[i] =
+        supine_render_camera_project(&c->camera, made.xyz + 3 * i, made.normals + 3 * i);
+  }
+  c->layers[LAYER_BODY] = (layer){corners, made.triangles, made.triangle_count};
+  return SUPINE_OK;
+}
+
 /* Compute normals at marks that are corners of triangles. The array `normals` begins with zeros. */
 static void find_normals(const supine_marks *marks, bool before, float *normals) {
   for (size_t t = 0; t < marks->triangle_count; ++t) {
@@ -389,16 +465,25 @@ static int by_nearness(const void *a, const void *b) {
   return (p->index > q->index) - (p->index < q->index);
 }
 
-/* A ghost is drawn where a target was, if it has moved; anatomy has none. */
+/* A ghost is drawn where the selected target was, if it has moved. */
 static bool has_ghost(const supine_mark *mark) {
-  return mark->moved && !mark->anatomy;
+  return mark->moved && mark->kind == SUPINE_MARK_SELECTED;
+}
+
+/* Return whether a triangle of a layer is translucent. `first` is the index of its first corner. */
+static bool is_translucent(const canvas *c, layer_name name, uint32_t first) {
+  if (name == LAYER_LUNGS) {
+    return true;
+  }
+  const supine_mark *mark = &c->scene->content->mark[first];
+  return name == LAYER_BEFORE ? has_ghost(mark) : mark->kind == SUPINE_MARK_ANATOMY;
 }
 
 static void add_triangles(canvas *c, layer_name name) {
   const layer *from = &c->layers[name];
   for (size_t t = 0; t < from->triangle_count; ++t) {
     const uint32_t *v = from->triangles + 3 * t;
-    if (name == LAYER_LUNGS || has_ghost(&c->scene->content->mark[v[0]])) {
+    if (is_translucent(c, name, v[0])) {
       const float nearness = from->corners[v[0]].nearness + from->corners[v[1]].nearness +
                              from->corners[v[2]].nearness;
       c->items[c->item_count++] = (item){nearness / 3.0F, (uint32_t)t, name, false};
@@ -410,12 +495,13 @@ static void add_triangles(canvas *c, layer_name name) {
 static supine_status add_items(canvas *c, supine_arena *keep, supine_error *error) {
   const supine_marks *marks = c->scene->content;
   const size_t points = marks != NULL ? marks->count : 0;
-  const size_t most =
-      c->layers[LAYER_LUNGS].triangle_count + c->layers[LAYER_BEFORE].triangle_count + points;
+  const size_t most = c->layers[LAYER_LUNGS].triangle_count +
+                      2 * c->layers[LAYER_BEFORE].triangle_count + points;
   c->items = supine_arena_take(keep, most, sizeof *c->items);
   SUPINE_TRY(supine_arena_check(keep, error, "%zu triangles", most));
   add_triangles(c, LAYER_LUNGS);
   add_triangles(c, LAYER_BEFORE);
+  add_triangles(c, LAYER_NOW);
   for (size_t i = 0; i < points; ++i) {
     if (marks->mark[i].radius > 0.0F && has_ghost(&marks->mark[i])) {
       c->items[c->item_count++] =
@@ -453,6 +539,7 @@ supine_status supine_render_draw(const supine_basis *basis, const supine_scene *
     SUPINE_TRY(add_content(&c, true, &arena, error));
   }
   if (scene->look == SUPINE_LOOK_SHELL) {
+    SUPINE_TRY(add_body(&c, supine_basis_get_info(basis), &arena, error));
     SUPINE_TRY(add_items(&c, &arena, error));
   }
   supine_parallel_for(scene->height, ROWS_PER_JOB, 0, draw_rows, &c);

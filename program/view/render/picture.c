@@ -13,7 +13,9 @@
 #include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
-#include "program/view/render/render.h"
+#include "program/view/render/canvas.h"
+#include "program/view/render/letters.h"
+#include "program/view/render/marks.h"
 
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
@@ -26,14 +28,14 @@
   EACH(cairo_, pdf_surface_set_metadata)                                                           \
   EACH(cairo_, pattern_create_linear) EACH(cairo_, pattern_destroy) EACH(cairo_, rectangle)        \
   EACH(cairo_, restore) EACH(cairo_, save) EACH(cairo_, scale)                                     \
-  EACH(cairo_, select_font_face) EACH(cairo_, set_font_size) EACH(cairo_, set_line_width)          \
+  EACH(cairo_, set_line_width)          \
   EACH(cairo_, set_source) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)              \
-  EACH(cairo_, set_source_surface) EACH(cairo_, show_text) EACH(cairo_, status)                    \
-  EACH(cairo_, status_to_string) EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)                \
+  EACH(cairo_, set_source_surface) EACH(cairo_, status)                    \
+  EACH(cairo_, status_to_string) EACH(cairo_, stroke)                \
   EACH(cairo_, surface_destroy) EACH(cairo_, surface_finish) EACH(cairo_, surface_flush)           \
   EACH(cairo_, surface_mark_dirty) EACH(cairo_, svg_surface_create_for_stream)                     \
   EACH(cairo_, surface_status) EACH(cairo_, surface_write_to_png_stream)                           \
-  EACH(cairo_, text_extents) EACH(cairo_, text_path) EACH(cairo_, translate)
+  EACH(cairo_, translate)
 /* clang-format on */
 
 /* Functions of cairo. They are loaded at the first use, so that all commands that draw nothing run
@@ -86,37 +88,33 @@ typedef struct painter {
   layout at;
 } painter;
 
+static supine_status load(supine_error *error) {
+  SUPINE_TRY(supine_render_marks_load(error));
+  return SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error);
+}
+
 static void colour(cairo_t *cr, const double rgb[3]) {
   cairo.set_source_rgb(cr, rgb[0], rgb[1], rgb[2]);
 }
 
-static void font(cairo_t *cr, double size, bool bold) {
-  cairo.select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL,
-                         bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-  cairo.set_font_size(cr, size);
-}
-
-static double text_width(cairo_t *cr, const char *text) {
-  cairo_text_extents_t extents;
-  cairo.text_extents(cr, text, &extents);
-  return extents.x_advance;
-}
-
 /* Draw text with its left end (align 0), middle (0.5) or right end (1) at x, baseline at y. */
-static void text(cairo_t *cr, double x, double y, double align, const char *words) {
-  cairo.move_to(cr, x - align * text_width(cr, words), y);
-  cairo.show_text(cr, words);
+static void text(cairo_t *cr, const letters *face, double x, double y, double align,
+                 const char *words) {
+  if (align > 0.0) {
+    x -= align * supine_render_letters_width(cr, face, words);
+  }
+  supine_render_letters_show(cr, face, x, y, words);
 }
 
-/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. Return the
- * size. */
-static double fitted_text(cairo_t *cr, double x, double y, double size, bool bold, double room,
+/* Draw text with its left end at x, reduced in size if it is wider than `room`, pixels. Return its
+ * width. */
+static double fitted_text(cairo_t *cr, double x, double y, const letters *face, double room,
                           const char *words) {
-  font(cr, size, bold);
-  const double fitted = size * fmin(1, room / text_width(cr, words));
-  font(cr, fitted, bold);
-  text(cr, x, y, 0, words);
-  return fitted;
+  letters fitted = *face;
+  const double width = supine_render_letters_width(cr, face, words);
+  fitted.size *= fmin(1.0, room / width);
+  text(cr, &fitted, x, y, 0.0, words);
+  return fmin(width, room);
 }
 
 static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
@@ -126,22 +124,6 @@ static void rounded(cairo_t *cr, double x, double y, double width, double height
   cairo.arc(cr, x + radius, y + height - radius, radius, pi / 2, pi);
   cairo.arc(cr, x + radius, y + radius, radius, pi, 3 * pi / 2);
   cairo.close_path(cr);
-}
-
-/* Draw an arrow from `from` to `to`. Its head and its line have the sizes `head` and `line`. */
-static void arrow(cairo_t *cr, const double from[2], const double to[2], double head, double line) {
-  const double length = hypot(to[0] - from[0], to[1] - from[1]);
-  const double dx = (to[0] - from[0]) / length;
-  const double dy = (to[1] - from[1]) / length;
-  cairo.set_line_width(cr, line);
-  cairo.move_to(cr, from[0], from[1]);
-  cairo.line_to(cr, to[0] - 0.8 * head * dx, to[1] - 0.8 * head * dy);
-  cairo.stroke(cr);
-  cairo.move_to(cr, to[0], to[1]);
-  cairo.line_to(cr, to[0] - head * dx - 0.5 * head * dy, to[1] - head * dy + 0.5 * head * dx);
-  cairo.line_to(cr, to[0] - head * dx + 0.5 * head * dy, to[1] - head * dy - 0.5 * head * dx);
-  cairo.close_path(cr);
-  cairo.fill(cr);
 }
 
 /* Draw gravity on the ball that shows the body's axes: as a circle with a dot if it points nearly
@@ -172,7 +154,7 @@ static void gravity_arrow(cairo_t *cr, double x, double y, double radius, const 
   const double length = radius * fmax(flat, 0.55) / flat;
   const double from[2] = {x - 0.25 * length * seen[0], y + 0.25 * length * seen[1]};
   const double to[2] = {x + length * seen[0], y - length * seen[1]};
-  arrow(cr, from, to, radius * 0.42, radius * 0.13);
+  supine_render_arrow(cr, from, to, radius * 0.42, radius * 0.13);
 }
 
 /* Draw the ball that shows the body's axes and gravity. */
@@ -191,7 +173,7 @@ static void ball(const painter *by, double x, double y, double radius, supine_vi
   cairo.set_source_rgba(cr, faint[0], faint[1], faint[2], 0.5);
   cairo.set_line_width(cr, fmax(0.6, radius * 0.035));
   cairo.stroke(cr);
-  font(cr, radius * 0.4, false);
+  const letters face = {radius * 0.4, false};
   for (int axis = 0; axis < 3; ++axis) {
     const double dx = axes[0][axis];
     const double dy = -axes[1][axis];
@@ -208,104 +190,10 @@ static void ball(const painter *by, double x, double y, double radius, supine_vi
     for (int end = 0; end < 2; ++end) {
       const double reach = (end == 0 ? 0.8 : -0.8) * radius;
       cairo.set_source_rgba(cr, ink[0], ink[1], ink[2], 0.8);
-      text(cr, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
+      text(cr, &face, x + reach * dx, y + reach * dy + 0.145 * radius, 0.5, ends[axis][end]);
     }
   }
   gravity_arrow(cr, x, y, radius * 0.66, seen);
-}
-
-/* Move the name at index `count` down until it overlaps no earlier name. `box` holds the left end,
- * the baseline and the width of each name, and `line` is the height of a line, pixels. */
-static void place_name(double (*box)[3], size_t count, double line) {
-  double *own = box[count];
-  for (size_t i = 0; i < count; ++i) {
-    const bool beside = own[0] > box[i][0] + box[i][2] || box[i][0] > own[0] + own[2];
-    if (!beside && fabs(own[1] - box[i][1]) < line * 0.999) {
-      own[1] = box[i][1] + line;
-      i = SIZE_MAX; /* the loop starts again with the first name */
-    }
-  }
-}
-
-/* Draw a label at `box`, which is as in place_name, and a line from it to its mark at `at`. */
-static void name(const painter *by, const char *label, const double at[2], const double box[3],
-                 double size) {
-  cairo_t *cr = by->cr;
-  const double *card = by->theme->card;
-  const bool right = box[0] > at[0];
-  colour(cr, by->theme->faint);
-  cairo.set_line_width(cr, size * 0.06);
-  cairo.move_to(cr, at[0] + (right ? 0.5 : -0.5) * size, at[1]);
-  cairo.line_to(cr, box[0] + (right ? -0.2 * size : box[2] + 0.2 * size), box[1] - 0.25 * size);
-  cairo.stroke(cr);
-  cairo.move_to(cr, box[0], box[1]);
-  cairo.text_path(cr, label);
-  cairo.set_source_rgba(cr, card[0], card[1], card[2], 0.85);
-  cairo.set_line_width(cr, size * 0.25);
-  cairo.stroke_preserve(cr);
-  colour(cr, by->theme->ink);
-  cairo.fill(cr);
-}
-
-/* Draw labels on the outer side of their marks at `pixel`, so that lines to them do not cross. */
-static void draw_names(const painter *by, const supine_marks *marks, double (*pixel)[2],
-                       double (*box)[3], double width) {
-  cairo_t *cr = by->cr;
-  const double size = by->at.font;
-  const double margin = 0.5 * size; /* part of that between the scene and the edge of its card */
-  double sum = 0.0;
-  size_t count = 0;
-  for (size_t i = 0; i < marks->count; ++i) {
-    sum += marks->mark[i].label != NULL ? pixel[i][0] : 0.0;
-    count += marks->mark[i].label != NULL;
-  }
-  font(cr, size * 0.68, false);
-  for (size_t i = 0, placed = 0; placed < count; ++i) {
-    if (marks->mark[i].label != NULL) {
-      double *own = box[placed];
-      own[2] = text_width(cr, marks->mark[i].label);
-      const double right = pixel[i][0] + 1.3 * size;
-      const double left = pixel[i][0] - 1.3 * size - own[2];
-      const bool outer_right = pixel[i][0] * (double)count >= sum * (1.0 - 1e-12);
-      own[0] = right + own[2] < width + margin && (outer_right || left < -margin)
-                   ? right
-                   : fmax(-margin, left);
-      own[1] = pixel[i][1] - size * 0.6;
-      place_name(box, placed++, size);
-      name(by, marks->mark[i].label, pixel[i], own, size);
-    }
-  }
-}
-
-/* Draw an arrow from the old place of each target to its place, then labels. Arrows are drawn over
- * the balls, with an edge in the colour of the ground, so that they are seen on any of them. The
- * origin is the upper left corner of the scene. */
-static supine_status draw_marks(const painter *by, const supine_scene *scene,
-                                const supine_marks *marks) {
-  cairo_t *cr = by->cr;
-  const double size = by->at.font;
-  SUPINE_ARENA arena = {0};
-  double(*pixel)[2] = supine_arena_take(&arena, marks->count, 2 * sizeof *pixel);
-  double(*box)[3] = supine_arena_take(&arena, marks->count, sizeof *box);
-  if (arena.failed) {
-    return SUPINE_ERROR_MEMORY;
-  }
-  double(*from)[2] = pixel + marks->count;
-  supine_render_project(by->basis, scene, marks, false, pixel);
-  supine_render_project(by->basis, scene, marks, true, from);
-  cairo.new_path(cr);
-  for (size_t i = 0; i < marks->count; ++i) {
-    const double moved = hypot(pixel[i][0] - from[i][0], pixel[i][1] - from[i][1]);
-    if (marks->mark[i].label != NULL && moved > 0.25 * size) {
-      const double head = fmin(size * 0.5, 0.6 * moved);
-      colour(cr, by->theme->card);
-      arrow(cr, from[i], pixel[i], 1.35 * head, size * 0.26);
-      colour(cr, by->theme->ink);
-      arrow(cr, from[i], pixel[i], head, size * 0.12);
-    }
-  }
-  draw_names(by, marks, pixel, box, (double)scene->width);
-  return SUPINE_OK;
 }
 
 static void free_surface(cairo_surface_t **surface) {
@@ -326,11 +214,41 @@ static supine_status draw_scene(const supine_basis *basis, const supine_scene *s
   return status;
 }
 
+/* Return the height of the table on which the patient of a panel lies, in the plane of
+ * supine_render_extent, mm: below the lowest point of the lungs by the thickness of the chest's wall
+ * where the torso is drawn. */
+static double ground_of(const supine_picture *picture, const double own[4]) {
+  static const double wall = 28.0; /* mm */
+  return picture->look == SUPINE_LOOK_SHELL ? own[2] - wall : own[2];
+}
+
+/* Return how far below the upper edge of a box {x, y, width, height} the height `ground`, mm, is drawn
+ * with an extent, as a share of the box's height (supine_render_camera_aim). */
+static double share_above(const double extent[4], const double box[4], double ground) {
+  const double wide = 1.03 * (extent[1] - extent[0]) / 2;
+  const double high = 1.03 * (extent[3] - extent[2]) / 2;
+  const double half = fmax(fmax(high, wide * box[3] / box[2]), 1e-3);
+  return 0.5 * (1.0 - (ground - (extent[2] + extent[3]) / 2) / half);
+}
+
+/* Draw the table at height `at`, pixels from the upper edge of a box {x, y, width, height}. */
+static void table(const painter *by, const double box[4], double at) {
+  const double *ground = by->theme->ground;
+  const double *faint = by->theme->faint;
+  const double share = by->picture->look == SUPINE_LOOK_SHELL ? 0.2 : 0.35; /* of `faint` */
+  cairo.rectangle(by->cr, box[0], box[1] + at, box[2], box[3] - at);
+  cairo.set_source_rgb(by->cr, ground[0] + share * (faint[0] - ground[0]),
+                       ground[1] + share * (faint[1] - ground[1]),
+                       ground[2] + share * (faint[2] - ground[2]));
+  cairo.fill(by->cr);
+}
+
 /* Draw the lungs and the marks of a panel in a box {x, y, width, height}, pixels. */
 static supine_status lungs(const painter *by, const supine_panel *panel, supine_view view,
                            const double box[4], const double extent[4], supine_error *error) {
   double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
   double own[4] = SUPINE_EXTENT_NONE;
+  double table_at = 1.0; /* share of the box's height above the table */
   supine_scene scene = {.pose = panel->pose,
                         .look = by->picture->look,
                         .value = panel->value,
@@ -342,10 +260,12 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
                         .width = (size_t)(by->detail * box[2]),
                         .height = (size_t)(by->detail * box[3]),
                         .extent = shown};
-  if (view == SUPINE_VIEW_LYING) { /* put the lungs of every posture on the table */
+  if (view == SUPINE_VIEW_LYING) { /* put the patient in every posture on the table */
     supine_render_extent(by->basis, &scene, own);
-    shown[2] = own[2];
-    shown[3] += own[2] - extent[2];
+    const double ground = ground_of(by->picture, own);
+    shown[2] += ground;
+    shown[3] += ground;
+    table_at = share_above(shown, box, ground);
   }
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
   SUPINE_TRY(draw_scene(by->basis, &scene, &image, error));
@@ -355,58 +275,102 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
   cairo.set_source_surface(by->cr, image, 0, 0);
   cairo.paint(by->cr);
   cairo.restore(by->cr);
+  if (table_at < 1.0 && fabs(panel->gravity[2]) < SUPINE_VIEW_LYING_TILT) {
+    table(by, box, box[3] * table_at);
+  }
   if (panel->marks != NULL) {
+    const marks_style style = {by->theme->card, by->theme->ink, by->theme->faint,
+                               by->theme->target, by->at.font};
     scene.width = (size_t)box[2];
     scene.height = (size_t)box[3];
     cairo.translate(by->cr, floor(box[0]), floor(box[1]));
-    SUPINE_TRY(draw_marks(by, &scene, panel->marks));
+    SUPINE_TRY(supine_render_marks_draw(by->cr, &style, by->basis, &scene));
     cairo.translate(by->cr, -floor(box[0]), -floor(box[1]));
   }
   return SUPINE_OK;
 }
 
-/* Draw the cell of the picture that shows the posture `column` from the view `row`. */
+/* Draw the three lines above the lungs of a panel, from x, y on, within `room`, pixels. */
+static void heading(const painter *by, const supine_panel *panel, supine_view view, double x,
+                    double y, double room) {
+  cairo_t *cr = by->cr;
+  const double size = by->at.font;
+  const letters title = {1.3 * size, true};
+  const letters figure = {0.85 * size, true};
+  const letters plain = {0.82 * size, false};
+  const letters small = {0.68 * size, false};
+  double used = 0.0;
+  colour(cr, by->theme->ink);
+  (void)fitted_text(cr, x, y + 1.3 * size, &title, room, panel->title);
+  if (panel->figure != NULL) {
+    colour(cr, by->theme->target);
+    used = fitted_text(cr, x, y + 2.5 * size, &figure, 0.5 * room, panel->figure) + 0.3 * size;
+  }
+  colour(cr, by->theme->faint);
+  (void)fitted_text(cr, x + used, y + 2.5 * size, &plain, room - used, panel->subtitle);
+  (void)fitted_text(cr, x, y + 3.5 * size, &small, room,
+                    view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
+}
+
+/* Draw the background of the cell that shows values: a card. */
+static void card(const painter *by, double x, double y) {
+  const layout *at = &by->at;
+  rounded(by->cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
+  colour(by->cr, by->theme->card);
+  cairo.fill_preserve(by->cr);
+  colour(by->cr, by->theme->edge);
+  cairo.set_line_width(by->cr, 1);
+  cairo.stroke(by->cr);
+}
+
+/* Draw the cell of the picture that shows the posture `column` from the view `row`. Shells touch
+ * each other, and gravity points down in them if they are seen as the patient lies; values have
+ * cards, with a ball that shows gravity. */
 static supine_status cell(const painter *by, size_t column, size_t row, const double extent[4],
                           supine_error *error) {
-  cairo_t *cr = by->cr;
   const layout *at = &by->at;
   const supine_panel *panel = &by->picture->panel[column];
   const supine_view view = by->picture->view[row];
-  const double gap = at->margin / 2;
-  const double x = at->margin + (double)column * (at->cell_width + gap);
-  const double y = at->margin + (double)row * (at->cell_height + gap);
+  const bool shell = by->picture->look == SUPINE_LOOK_SHELL;
+  const double edge = shell ? 0.0 : at->margin;
+  const double gap = shell ? 0.0 : at->margin / 2;
+  const double x = edge + (double)column * (at->cell_width + gap);
+  const double y = edge + (double)row * (at->cell_height + gap);
   const double radius = at->heading_height * 0.4;
-  const double words = x + 2 * radius + at->font * 1.5;
-  const double room = x + at->cell_width - words - at->font;
-  rounded(cr, x, y, at->cell_width, at->cell_height, at->font * 0.7);
-  colour(cr, by->theme->card);
-  cairo.fill_preserve(cr);
-  colour(cr, by->theme->edge);
-  cairo.set_line_width(cr, 1);
-  cairo.stroke(cr);
-  ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
-       panel->gravity);
-  colour(cr, by->theme->ink);
-  (void)fitted_text(cr, words, y + at->heading_height / 2 - at->font * 0.25, at->font * 1.3, true,
-                    room, panel->title);
-  colour(cr, panel->about_target ? by->theme->target : by->theme->faint);
-  const double size = fitted_text(cr, words, y + at->heading_height / 2 + at->font * 0.95,
-                                  at->font * 0.82, false, room, panel->subtitle);
-  colour(cr, by->theme->faint);
-  (void)fitted_text(cr, words, y + at->heading_height / 2 + at->font * 2.0, size, false, room,
-                    view == SUPINE_VIEW_LYING ? panel->note : supine_render_view_name(view));
-  double below = at->font * 0.5; /* height of the space below the lungs */
-  if (view == SUPINE_VIEW_LYING &&
-      fabs(panel->gravity[2]) < SUPINE_VIEW_LYING_TILT) { /* the table */
-    cairo.rectangle(cr, x + at->font, y + at->cell_height - 2 * at->font,
-                    at->cell_width - 2 * at->font, at->font * 0.9);
-    cairo.set_source_rgba(cr, by->theme->faint[0], by->theme->faint[1], by->theme->faint[2], 0.35);
-    cairo.fill(cr);
-    below = at->font * 3;
+  const bool ball_shown = !shell || view != SUPINE_VIEW_LYING;
+  const double words = x + at->font + (ball_shown ? 2 * radius + 0.5 * at->font : 0.0);
+  const double room = x + at->cell_width - words - 0.5 * at->font;
+  const double side = shell ? 0.0 : 0.5 * at->font; /* space beside and below the lungs */
+  const double box[4] = {x + side, y + at->heading_height, at->cell_width - 2 * side,
+                         at->cell_height - at->heading_height - side};
+  if (!shell) {
+    card(by, x, y);
   }
-  const double box[4] = {x + at->font * 0.5, y + at->heading_height, at->cell_width - at->font,
-                         at->cell_height - at->heading_height - below};
-  return lungs(by, panel, view, box, extent, error);
+  SUPINE_TRY(lungs(by, panel, view, box, extent, error));
+  if (ball_shown) {
+    ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius,
+         view, panel->gravity);
+  }
+  heading(by, panel, view, words, y + at->font * 0.3, room);
+  return SUPINE_OK;
+}
+
+/* Write what the signs of a shell mean, and a remark, below the cells. */
+static void footer(const painter *by) {
+  const supine_picture *picture = by->picture;
+  const double width = (double)picture->width;
+  const letters face = {fmax(10.0, 0.6 * by->at.font), false};
+  const double y = (double)picture->height - 0.45 * by->at.footer_height;
+  const double edge = by->at.font;
+  double used = 0.0;
+  colour(by->cr, by->theme->faint);
+  if (picture->remark != NULL) {
+    used = supine_render_letters_width(by->cr, &face, picture->remark) + edge;
+    text(by->cr, &face, width - edge, y, 1.0, picture->remark);
+  }
+  if (picture->legend != NULL) {
+    (void)fitted_text(by->cr, edge, y, &face, width - 2 * edge - used, picture->legend);
+  }
 }
 
 static void colour_bar(const painter *by) {
@@ -434,9 +398,9 @@ static void colour_bar(const painter *by) {
   cairo.set_source(cr, fade);
   cairo.fill(cr);
   cairo.pattern_destroy(fade);
-  font(cr, at->font * 0.85, false);
+  const letters face = {at->font * 0.85, false};
   colour(cr, by->theme->ink);
-  text(cr, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
+  text(cr, &face, x + width / 2, y - at->font * 0.5, 0.5, picture->bar_label);
   colour(cr, by->theme->faint);
   cairo.set_line_width(cr, 1);
   for (int i = 0; i * step <= picture->largest * (1 + 1e-9); ++i) {
@@ -446,7 +410,7 @@ static void colour_bar(const painter *by) {
     cairo.move_to(cr, tick, y + height + at->font * 0.15);
     cairo.line_to(cr, tick, y + height + at->font * 0.4);
     cairo.stroke(cr);
-    text(cr, tick, y + height + at->font * 1.3, 0.5, number);
+    text(cr, &face, tick, y + height + at->font * 1.3, 0.5, number);
   }
 }
 
@@ -454,18 +418,22 @@ static layout make_layout(const supine_picture *picture) {
   layout at;
   const double width = (double)picture->width;
   const double height = (double)picture->height;
-  at.font =
-      fmin(width / (double)picture->panel_count / 19, height / (double)picture->view_count / 24);
-  at.font = fmin(28, at.font);
+  const double columns = (double)picture->panel_count;
+  const double rows = (double)picture->view_count;
+  at.font = fmin(28, fmin(width / columns / 19, height / rows / 24));
   at.margin = at.font * 0.9;
-  at.heading_height = at.font * 5.2;
-  at.footer_height = picture->look == SUPINE_LOOK_MAP ? at.font * 4.6 : at.margin;
+  if (picture->look == SUPINE_LOOK_SHELL) {
+    at.heading_height = at.font * 4.1;
+    at.footer_height = at.font * 1.6;
+    at.cell_width = floor(width / columns);
+    at.cell_height = (height - at.footer_height) / rows;
+    return at;
+  }
   const double gap = at.margin / 2;
-  at.cell_width = (width - 2 * at.margin - gap * (double)(picture->panel_count - 1)) /
-                  (double)picture->panel_count;
-  at.cell_height =
-      (height - at.margin - at.footer_height - gap * (double)(picture->view_count - 1)) /
-      (double)picture->view_count;
+  at.heading_height = at.font * 5.2;
+  at.footer_height = at.font * 4.6;
+  at.cell_width = (width - 2 * at.margin - gap * (columns - 1)) / columns;
+  at.cell_height = (height - at.margin - at.footer_height - gap * (rows - 1)) / rows;
   return at;
 }
 
@@ -473,10 +441,21 @@ void supine_render_picture_extent(const supine_basis *basis, const supine_pictur
                                   double (*extent)[4]) {
   for (size_t row = 0; row < picture->view_count; ++row) {
     for (size_t column = 0; column < picture->panel_count; ++column) {
-      const supine_scene scene = {.pose = picture->panel[column].pose,
-                                  .view = picture->view[row],
-                                  .gravity = picture->panel[column].gravity};
-      supine_render_extent(basis, &scene, extent[row]);
+      const supine_panel *panel = &picture->panel[column];
+      const supine_scene scene = {
+          .pose = panel->pose, .view = picture->view[row], .gravity = panel->gravity};
+      double own[4] = SUPINE_EXTENT_NONE;
+      supine_render_extent(basis, &scene, own);
+      const double ground =
+          picture->view[row] == SUPINE_VIEW_LYING ? ground_of(picture, own) : 0.0;
+      if (picture->look == SUPINE_LOOK_SHELL && picture->view[row] == SUPINE_VIEW_LYING) {
+        own[2] = fmin(own[2], ground - 10.0); /* show the table, too */
+      }
+      for (size_t side = 0; side < 4; side += 2) {
+        const double shift = side == 2 ? ground : 0.0;
+        extent[row][side] = fmin(extent[row][side], own[side] - shift);
+        extent[row][side + 1] = fmax(extent[row][side + 1], own[side + 1] - shift);
+      }
     }
   }
 }
@@ -504,6 +483,8 @@ static supine_status compose(const painter *by, supine_error *error) {
   }
   if (picture->look == SUPINE_LOOK_MAP) {
     colour_bar(by);
+  } else {
+    footer(by);
   }
   return SUPINE_OK;
 }
@@ -544,7 +525,7 @@ static supine_status draw_on(cairo_surface_t *surface, double detail, const supi
 
 supine_status supine_render_picture_draw(const supine_basis *basis, const supine_picture *picture,
                                          uint32_t *pixels, supine_error *error) {
-  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_TRY(load(error));
   SUPINE_FREED_BY(free_surface)
   cairo_surface_t *surface = cairo.image_surface_create_for_data(
       (unsigned char *)pixels, CAIRO_FORMAT_RGB24, (int)picture->width, (int)picture->height,
@@ -584,7 +565,7 @@ static supine_status write_picture(const char *path, FILE *file, const supine_ba
 supine_status supine_render_picture_save(const supine_basis *basis, const supine_picture *picture,
                                          const char *path, supine_error *error) {
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
-  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_TRY(load(error));
   SUPINE_TRY(supine_output_open(path, &output, error));
   const supine_status status = write_picture(path, output.file, basis, picture, error);
   return status == SUPINE_OK || ferror(output.file) != 0 ? supine_output_commit(&output, error)
@@ -593,7 +574,7 @@ supine_status supine_render_picture_save(const supine_basis *basis, const supine
 
 supine_status supine_render_png(const supine_basis *basis, const supine_scene *scene, FILE *file,
                                 supine_error *error) {
-  SUPINE_TRY(SUPINE_LIBRARY_LOAD(SUPINE_CAIRO, FUNCTIONS, &cairo, error));
+  SUPINE_TRY(load(error));
   SUPINE_FREED_BY(free_surface) cairo_surface_t *image = NULL;
   SUPINE_TRY(draw_scene(basis, scene, &image, error));
   return write_png(image, file, error);

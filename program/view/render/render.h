@@ -61,15 +61,28 @@ typedef enum supine_look {
                           ghost of each target where it was */
 } supine_look;
 
+/** What a structure inside the lungs is, which decides its colour. */
+typedef enum supine_mark_kind {
+  SUPINE_MARK_TARGET = 0, /**< teal */
+  SUPINE_MARK_SELECTED,   /**< the target that the captions are about: orange, with a ghost where it
+                             was, an arrow, and a ring of its expected error */
+  SUPINE_MARK_ANATOMY     /**< part of a large structure, such as airways or a lobe: a translucent
+                             shell with one of SUPINE_RENDER_TINTS colours, without ghost and arrow */
+} supine_mark_kind;
+
+enum { SUPINE_RENDER_TINTS = 6 }; /**< number of colours of anatomy, which repeat */
+
 /** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {
-  float xyz[3];      /**< position, mm */
-  float from[3];     /**< position from which displacements are measured, mm */
-  float radius;      /**< radius of the ball that shows it, mm; 0 for no ball */
-  bool anatomy;      /**< whether it is part of a large structure, such as airways or a lobe, which
-                        has another colour than targets, and neither a ghost nor an arrow */
-  bool moved;        /**< whether its structure is elsewhere than it was */
-  const char *label; /**< text written beside the mark, or NULL */
+  float xyz[3];          /**< position, mm */
+  float from[3];         /**< position from which displacements are measured, mm */
+  float radius;          /**< radius of the ball that shows it, mm; 0 for no ball */
+  supine_mark_kind kind; /**< what its structure is */
+  size_t tint;           /**< index of the colour of anatomy */
+  bool moved;            /**< whether its structure is elsewhere than it was */
+  const char *label;     /**< text written beside the mark, or NULL */
+  float reach;           /**< of a mark with a label, radius of its structure, mm */
+  float expected;        /**< of a mark with a label, expected error, mm; 0: no ring is drawn */
 } supine_mark;
 
 typedef struct supine_marks {
@@ -116,17 +129,21 @@ supine_status supine_render_png(const supine_basis *basis, const supine_scene *s
                                 supine_error *error);
 
 /** Compute the positions of marks in the drawing of a scene, or those of supine_mark.from.
- * @param pixel  [count, 2] pixels from the left and upper edges; output */
+ * @param pixel  [count, 3] pixels from the left and upper edges, and pixels per mm there; output */
 void supine_render_project(const supine_basis *basis, const supine_scene *scene,
-                           const supine_marks *marks, bool from, double (*pixel)[2]);
+                           const supine_marks *marks, bool from, double (*pixel)[3]);
+
+/** Load the library that shapes Arabic, Hebrew and other scripts. Return false if it is not
+ * installed: pictures then have unshaped text. */
+bool supine_render_shapes_text(void);
 
 /** A column of a picture: the lungs in one posture. */
 typedef struct supine_panel {
   const char *title;
-  const char *subtitle;
-  bool
-      about_target; /**< whether `subtitle` is about a target, so that it has the targets' colour */
-  const char *note; /**< third line, in place of the name of the view SUPINE_VIEW_LYING */
+  const char *figure;   /**< number at the beginning of the second line, in the colour of the
+                           selected target; NULL for none */
+  const char *subtitle; /**< rest of the second line */
+  const char *note;     /**< third line, in place of the name of the view SUPINE_VIEW_LYING */
   double gravity[3];
   const supine_pose *pose;
   const float *value;
@@ -142,6 +159,8 @@ typedef struct supine_picture {
   const supine_view *view;
   size_t view_count; /**< 1 to SUPINE_VIEWS_MAX */
   const char *bar_label;
+  const char *legend;        /**< below a shell, on the left: what its signs mean; NULL for none */
+  const char *remark;        /**< below a shell, on the right; NULL for none */
   supine_look look;          /**< a shell has a dark background, and no colour bar */
   double largest;            /**< value that the last colour shows, mm */
   const double (*extent)[4]; /**< [view_count] smallest and largest x, then y, of each view, mm;
@@ -158,7 +177,8 @@ double supine_render_bar_step(double value);
 double supine_render_bar_end(double value);
 
 /** Enlarge the extents of all views (see supine_render_extent) so that they contain a picture.
- * Several pictures can then be drawn at one scale.
+ * Several pictures can then be drawn at one scale. With SUPINE_VIEW_LYING, y counts from the table
+ * on which the patient lies.
  * @param extent  [view_count, 4] smallest and largest x, then y, of each view, mm */
 void supine_render_picture_extent(const supine_basis *basis, const supine_picture *picture,
                                   double (*extent)[4]);

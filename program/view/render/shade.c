@@ -12,7 +12,12 @@ static const float pink[3] = {0.92F, 0.66F, 0.62F};        /* of the shell where
 static const float nearly_white[3] = {1.0F, 0.95F, 0.93F}; /* of its rim */
 static const float white[3] = {1.0F, 1.0F, 1.0F};
 static const float orange[3] = {0.98F, 0.49F, 0.20F};
-static const float teal[3] = {0.44F, 0.76F, 0.84F};
+static const float teal[3] = {0.40F, 0.74F, 0.76F};
+static const float slate[3] = {0.36F, 0.46F, 0.58F};
+/* Of anatomy, as on the page: blue, violet, green, ochre, pink, grey. */
+static const float tints[SUPINE_RENDER_TINTS][3] = {
+    {0.31F, 0.54F, 0.88F}, {0.65F, 0.44F, 0.88F}, {0.25F, 0.62F, 0.39F},
+    {0.69F, 0.54F, 0.12F}, {0.82F, 0.35F, 0.49F}, {0.48F, 0.53F, 0.59F}};
 
 static float smoothstep(float low, float high, float x) {
   const float t = fminf(1.0F, fmaxf(0.0F, (x - low) / (high - low)));
@@ -81,6 +86,24 @@ static void shade_shell(const fragment *at, float rgba[4]) {
   }
 }
 
+/* Draw anatomy as the lungs, but in a colour of its own. */
+static void shade_anatomy(const fragment *at, float rgba[4]) {
+  const float *tint = tints[at->tint % SUPINE_RENDER_TINTS];
+  const float f = 1.0F - fminf(1.0F, fmaxf(0.0F, dot(at->normal, at->eye)));
+  rgba[3] = 0.22F + 0.58F * f * f;
+  for (int k = 0; k < 3; ++k) {
+    rgba[k] = rgba[3] * (tint[k] + 0.25F * f * (1.0F - tint[k]));
+  }
+}
+
+static void shade_body(const fragment *at, float rgba[4]) {
+  const float f = 1.0F - fminf(1.0F, fmaxf(0.0F, dot(at->normal, at->eye)));
+  rgba[3] = 0.14F + 0.34F * f;
+  for (int k = 0; k < 3; ++k) {
+    rgba[k] = rgba[3] * slate[k];
+  }
+}
+
 static void shade_ghost(const fragment *at, float rgba[4]) {
   const float f = 1.0F - fminf(1.0F, fmaxf(0.0F, dot(at->normal, at->eye)));
   rgba[3] = 0.30F + 0.60F * f * f;
@@ -111,10 +134,19 @@ void supine_render_shade(const shades *tables, material what, const fragment *at
     shade_ghost(at, rgba);
     break;
   case MATERIAL_TARGET:
+    shade_solid(at, teal, rgba);
+    break;
+  case MATERIAL_SELECTED:
     shade_solid(at, orange, rgba);
     break;
   case MATERIAL_ANATOMY:
-    shade_solid(at, teal, rgba);
+    shade_anatomy(at, rgba);
+    break;
+  case MATERIAL_DOT:
+    shade_solid(at, tints[at->tint % SUPINE_RENDER_TINTS], rgba);
+    break;
+  case MATERIAL_BODY:
+    shade_body(at, rgba);
     break;
   }
 }
