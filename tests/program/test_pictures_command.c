@@ -484,13 +484,13 @@ TEST(test_render_thirty_targets_eight_named) {
   size_t size = 0;
   char *words = test_read(in_folder("thirty.txt"), &size);
   char joined[4096];
-  size_t used = 0; /* pdftotext may set spaces between letters */
-  for (const char *at = words; *at != '\0' && used + 1 < sizeof joined; ++at) {
+  size_t length = 0; /* pdftotext may set spaces between letters */
+  for (const char *at = words; *at != '\0' && length + 1 < sizeof joined; ++at) {
     if (*at != ' ') {
-      joined[used++] = *at;
+      joined[length++] = *at;
     }
   }
-  joined[used] = '\0';
+  joined[length] = '\0';
   assert_says(joined, "and22moretargets");
   free(words);
 }
