@@ -3,8 +3,8 @@
 
     python3 tests/cost.py [BUILD_FOLDER [CTEST_OPTION...]]
 
-By default, run the tests with the label `quick` in build/release, and fail if they exceed the limits that README's second
-command keeps. For all tests: python3 tests/cost.py build/release -R . (no limits apply then)."""
+By default, run the tests with the label `quick` in build/release, and fail if they exceed the limits that README's
+second command keeps. For all tests: python3 tests/cost.py build/release -R . (no limits apply then)."""
 import ctypes
 import json
 import os
@@ -18,8 +18,8 @@ PR_SET_CHILD_SUBREAPER = 36
 
 def listed(build, options):
     """Return the names of tests, those that prepare something for others first."""
-    text = subprocess.run(["ctest", "--test-dir", build, *options, "--show-only=json-v1"], capture_output=True, text=True,
-                          check=True).stdout
+    text = subprocess.run(["ctest", "--test-dir", build, *options, "--show-only=json-v1"], capture_output=True,
+                          text=True, check=True).stdout
     tests = json.loads(text)["tests"]
     prepares = lambda test: any(p["name"] == "FIXTURES_SETUP" for p in test.get("properties", []))
     return [test["name"] for test in sorted(tests, key=lambda test: not prepares(test))]

@@ -6,108 +6,14 @@ show the verdicts: taken, told (a warning) or refused. All interfaces must give 
 
 The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target `npm`
 was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
-import ctypes
-import importlib.util
-import json
 import os
-import re
-import shutil
-import socket
 import struct
-import subprocess
 import sys
-import tempfile
-import warnings
 
-if importlib.util.find_spec("numpy") is None:
-    print("skipped: this python has no numpy")
-    sys.exit(77)
+from helpers.verdict import SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table, transform, write_ply
 import numpy as np
 
-BUILD = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else "build/release")
-SOURCE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-SUPINE = os.path.join(BUILD, "supine")
-PACKAGE = os.path.join(BUILD, "runtime/js/package/supine.js")
 INTERFACES = ("command", "C", "Python", "JavaScript")
-folder = tempfile.TemporaryDirectory()
-os.chdir(folder.name)
-shutil.copytree(os.path.join(SOURCE, "runtime/python/supine"), "py/supine")
-for library in ("runtime/libsupine_runtime.so", "precompute/library/libsupine_precompute.so"):
-    name = os.path.join(BUILD, library)
-    if not os.path.exists(name):
-        print(f"skipped: the build has no {library}")
-        sys.exit(77)
-    shutil.copy(name, "py/supine")
-os.environ["PATH"] = BUILD + os.pathsep + os.environ["PATH"]
-sys.path.insert(0, os.path.abspath("py"))
-import supine
-from supine import _library as c
-
-
-class Row(ctypes.Structure):
-    """The C struct supine_input."""
-    _fields_ = [*((name, ctypes.c_char_p) for name in ("name", "group", "input", "against", "measured")),
-                ("below", ctypes.c_bool), ("told", ctypes.c_double), ("refused", ctypes.c_double),
-                ("evidence", ctypes.c_char_p), ("people", ctypes.c_int), ("n", ctypes.c_int),
-                ("remedy", ctypes.c_char_p), ("interfaces", ctypes.c_uint)]
-
-
-def table():
-    """Return the rows of the table, in its order."""
-    get = ctypes.CDLL(os.path.abspath("py/supine/libsupine_runtime.so")).supine_input_get
-    get.restype = ctypes.POINTER(Row)
-    rows = []
-    while get(len(rows)):
-        rows.append(get(len(rows)).contents)
-    return rows
-
-
-def command(*words):
-    """Run the program; return the verdict and what it said."""
-    done = subprocess.run([SUPINE, *map(str, words)], capture_output=True, text=True, check=False)
-    assert done.returncode in (0, 1, 2, 5), done
-    return ("refused" if done.returncode else "told" if "warning:" in done.stderr else "taken"), done.stderr
-
-
-def python(call):
-    """Call a function of the Python package; return the verdict and what it said."""
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        try:
-            call()
-        except (ValueError, TypeError, ArithmeticError, supine.Error) as error:
-            return "refused", str(error)
-    return ("told" if said else "taken"), " ".join(str(w.message) for w in said)
-
-
-def pose_in_c(posture, volume, basis=None):
-    """Compute a pose as a C program does."""
-    given, other = c.State((0.0, 1.0, 0.0)), c.State()
-    c.state_parse(posture.encode(), given)
-    if volume:
-        c.state_parse_volume(volume.encode(), other)
-    c.state_join(given, other, given)
-    c.basis_pose((basis or lungs)._c, given, supine.Pose())
-
-
-JAVASCRIPT = """
-import { readFileSync } from 'node:fs';
-const { open } = await import(process.argv[1]);
-const lungs = await open(readFileSync(process.argv[3]));
-const say = (state) => { try { lungs.pose(state); return ['taken', '']; } catch (error) { return ['refused', error.message]; } };
-console.log(JSON.stringify(JSON.parse(process.argv[2]).map(say)));
-"""
-
-
-def javascript(state, basis="lungs.safetensors"):
-    """Compute a pose in node; return None if it cannot run."""
-    node = shutil.which("node")
-    if node is None or not os.path.exists(PACKAGE):
-        return None
-    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps([state]), basis],
-                          capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return tuple(json.loads(done.stdout)[0])
 
 
 def state(posture, volume="", javascript_state=None):
@@ -115,9 +21,9 @@ def state(posture, volume="", javascript_state=None):
     text = javascript_state or (f"{posture}:{volume}" if volume else posture)
     return {"command": lambda: command("deform", "lungs.safetensors", "--posture", posture,
                                        *(["--volume", volume] if volume else []), "-o", "out.ply"),
-            "C": lambda: python(lambda: pose_in_c(posture, volume)),
+            "C": lambda: python(lambda: pose_in_c(lungs, posture, volume)),
             "Python": lambda: python(lambda: lungs.pose(posture, volume)),
-            "JavaScript": lambda: javascript(text)}
+            "JavaScript": lambda: javascript(text, "lungs.safetensors")}
 
 
 def made(path, **options):
@@ -161,36 +67,9 @@ def located(volume, degrees=0.0):
     return {"command": by_command, "C": by_python, "Python": by_python}
 
 
-def crc64(data):
-    crc = 0
-    for byte in data:
-        crc ^= byte << 56
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x42F0E1EBA9EA3693 if crc >> 63 else 0)) & (1 << 64) - 1
-    return crc
-
-
 def tracked(status, device="Patient"):
-    """Send a pose with metadata to the live lungs, and stop them."""
-    key, value = b"TransformStatus", status.encode()
-    matrix = struct.pack(">12f", 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0)
-    texts = key + value
-    body = struct.pack(">HHIi", 12, 10, len(texts), 1) + matrix + struct.pack(">HHHI", 1, len(key), 3, len(value)) + texts
-    head = struct.pack(">H12s20sQQQ", 2, b"TRANSFORM", b"Patient", 0, len(body), crc64(body))
-
-    def run():
-        with subprocess.Popen([SUPINE, "stream", "lungs.safetensors", "--listen", "0", "--device", device],
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
-            line = server.stdout.readline()
-            if "port" not in line:
-                return "refused", server.communicate()[1]
-            with socket.create_connection(("127.0.0.1", int(re.search(r"port (\d+)", line)[1]))) as peer:
-                peer.sendall(head + body)
-                peer.recv(1)  # the first frame
-            server.terminate()
-            said = "".join(server.communicate(timeout=20))
-        return ("told" if "marked as invalid: 1" in said else "taken"), said
-    return {"command": run}
+    """Send a pose to the live lungs."""
+    return {"command": lambda: stream("lungs.safetensors", "--device", device, message=transform(status=status))}
 
 
 def suggested(word):
@@ -214,7 +93,7 @@ def field(posture):
 
 def members(value):
     given = value if isinstance(value, dict) else list(value)
-    return {"JavaScript": lambda: javascript(given),
+    return {"JavaScript": lambda: javascript(given, "lungs.safetensors"),
             "Python": lambda: python(lambda: lungs.pose(given.get("gravity", given) if isinstance(given, dict) else given,
                                                         given.get("volume", "") if isinstance(given, dict) else ""))}
 
@@ -371,14 +250,6 @@ CASES = {
 }
 
 
-def even(count):
-    """Directions spread evenly over the sphere."""
-    i = np.arange(count)
-    z = 1 - (2 * i + 1) / count
-    return np.column_stack([np.sqrt(1 - z * z) * np.cos(i * np.pi * (3 - 5 ** 0.5)),
-                            np.sqrt(1 - z * z) * np.sin(i * np.pi * (3 - 5 ** 0.5)), z])
-
-
 def simulated(directions=None, volumes=1, change=lambda u: u):
     """Fields of another simulator: the lungs sag along gravity, the lower part more, and widen with their volume."""
     directions = even(40) if directions is None else directions
@@ -405,7 +276,7 @@ def simulated_volume(factor):
         basis = supine.precompute("lungs.ply", fields="given.safetensors", output="simulated.safetensors")
         return call(basis, f"prone:{factor * sum(basis.volumes(basis.pose('prone'))):.0f}mL")
     return {"command": lambda: run(lambda _, text: command("deform", "simulated.safetensors", "--posture", text, "-o", "out.ply")),
-            "C": lambda: run(lambda basis, text: python(lambda: pose_in_c(text, "", basis))),
+            "C": lambda: run(lambda basis, text: python(lambda: pose_in_c(basis, text))),
             "Python": lambda: run(lambda basis, text: python(lambda: basis.pose(text))),
             "JavaScript": lambda: run(lambda _, text: javascript(text, "simulated.safetensors"))}
 
@@ -462,14 +333,6 @@ def grid_of():
     voxels = np.zeros(shape, np.uint8)
     voxels[tuple(place)] = np.where(deep > 0, 1 + np.asarray(basis.tensor("lung")).ravel(), 0)
     return basis, steps, deep, voxels, np.where(voxels > 0, -850, 40).astype(np.int16)
-
-
-def write_ply(target, vertices, faces):
-    with open(target, "w", encoding="utf-8") as file:
-        file.write(f"ply\nformat ascii 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
-                   f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
-        np.savetxt(file, vertices, "%.6f")
-        np.savetxt(file, np.column_stack([np.full(len(faces), 3), faces]), "%d")
 
 
 def prepare():

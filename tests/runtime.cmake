@@ -55,7 +55,9 @@ endif()
 # Give a right and a wrong input of each row of docs/inputs.md to every interface.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME inputs_everywhere COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/inputs.py ${PROJECT_BINARY_DIR})
-  set_tests_properties(inputs_everywhere PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 FIXTURES_REQUIRED npm_package)
+  # Give each input of each interface every kind of mistake.
+  add_test(NAME doors COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/doors.py ${PROJECT_BINARY_DIR})
+  set_tests_properties(inputs_everywhere doors PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 FIXTURES_REQUIRED npm_package)
 endif()
 
 # Build and run the library for other platforms, where their compilers and emulators are installed.
