@@ -286,7 +286,7 @@ TEST(test_save_vtp_more_than_65536_points_loads_same) {
   assert_int_equal(unlink(path), 0);
 }
 
-TEST(test_save_vtp_opens_in_vtk) {
+TEST_FULL(test_save_vtp_opens_in_vtk) {
   static const char check[] =
       "import sys, vtk\n"
       "r = vtk.vtkXMLPolyDataReader()\n"

@@ -383,7 +383,8 @@ static int sweep(const char *path, const struct stat *status, int type, struct F
   (void)walk;
   if (type == FTW_F) {
     ++sweep_files;
-    const int code = run("precompute '%s' --band 1 -o swept.safetensors", path);
+    (void)setenv("SWEPT", path, 1);
+    const int code = run("precompute \"$SWEPT\" --band 1 -o swept.safetensors");
     if ((code != 0 && code != 2) || (code != 0) != (count_files("swept") == 0)) {
       printf("%s: exit code %d: %s\n", path, code, printed);
       ++sweep_failures;
