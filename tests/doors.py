@@ -291,8 +291,8 @@ ROWS = {("scan", "person"): "person-depth-least", ("scan", "swapped"): "rest-mos
 KNOWN = {
     **{(door, "shifted"): "belongs" for door in ("command precompute MESH", "Python precompute()", "command solve MESH")},
     ("command validate --state", "swapped"): "belongs",
-    ("command validate --landmarks", "mirror"): "belongs",
-    ("command validate --landmarks", "person"): "belongs",
+    **{(door, kind): "belongs" for door in ("command fit --landmarks", "command validate --landmarks")
+       for kind in ("mirror", "person")},
     ("command embed LABELS", "axes"): "belongs",
     ("command embed LABELS", "mirror"): "belongs",
     ("command deform --image", "shifted"): "belongs",
