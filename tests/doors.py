@@ -58,9 +58,10 @@ def voxels():
 
 def fields():
     """Return fields of another simulator: the lungs sag along gravity, the lower part more."""
-    place, directions = (surface[0] - middle) / 100, even(40)
+    points, directions = other.vertices.astype(float), even(40)
+    place = (points - points.mean(axis=0)) / 100
     field = lambda g: (5 - (place ** 2).sum(1))[:, None] * g + 3 * np.tanh(place @ g)[:, None] * place
-    return {"points": surface[0], "gravity": directions, "displacement": np.array([field(g) for g in directions])}
+    return {"points": points, "gravity": directions, "displacement": np.array([field(g) for g in directions])}
 
 
 # ---- Writers: a file of each type.
@@ -231,8 +232,8 @@ DOORS = [
     ("deform --image", "command", "image",
      lambda x: command("deform", "grid.st", "--posture", "prone:rest", "--image", x, "--density", "-o", "out.nrrd")),
     ("precompute --fields", "command", "fields",
-     lambda x: command("precompute", "full.ply", "--fields", x, "-o", "out.st")),
-    ("precompute(fields)", "Python", "fields", lambda x: python(lambda: supine.precompute("full.ply", fields=x))),
+     lambda x: command("precompute", "other.ply", "--fields", x, "-o", "out.st")),
+    ("precompute(fields)", "Python", "fields", lambda x: python(lambda: supine.precompute("other.ply", fields=x))),
     ("deform BASIS", "command", "basis", lambda x: command("deform", x, "--posture", "prone", "-o", "out.ply")),
     ("info BASIS", "command", "basis", lambda x: command("info", x)),
     ("stream BASIS", "stream", "basis", lambda x: stream(x)),
@@ -293,11 +294,12 @@ KNOWN = {
     ("command validate --state", "swapped"): "belongs",
     **{(door, kind): "belongs" for door in ("command fit --landmarks", "command validate --landmarks")
        for kind in ("mirror", "person")},
+    ("command fit --landmarks", "axes"): "belongs",
     ("command embed LABELS", "axes"): "belongs",
     ("command embed LABELS", "mirror"): "belongs",
     ("command deform --image", "shifted"): "belongs",
     **{(door, kind): "fields" for door in ("command precompute --fields", "Python precompute(fields)")
-       for kind in ("axes", "mirror", "swapped", "repeated")},
+       for kind in ("axes", "mirror", "swapped")},
     ("command embed MESH", "range"): "one road",
     ("stream stream --volume", "range"): "one road",
     **{(door, "unit"): "one road" for door in ("command compare --breath", "command export --breath",
