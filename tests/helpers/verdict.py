@@ -88,23 +88,27 @@ def pose_in_c(basis, posture, volume=""):
 JAVASCRIPT = """
 import { readFileSync } from 'node:fs';
 const { open } = await import(process.argv[1]);
-const lungs = await open(readFileSync(process.argv[3]));
-const say = (state) => {
-  try { lungs.pose(state); return ['taken', '']; } catch (error) { return ['refused', error.message]; }
-};
-console.log(JSON.stringify(JSON.parse(process.argv[2]).map(say)));
+const state = new Function(`return ${process.argv[2]}`)(); // JSON has no NaN
+let said = ['taken', ''];
+try {
+  const lungs = await open(readFileSync(process.argv[3]));
+  lungs.pose(state);
+} catch (error) {
+  said = ['refused', error.message];
+}
+console.log(JSON.stringify(said));
 """
 
 
 def javascript(state, basis):
-    """Compute a pose in node; return None if it cannot run."""
+    """Open a basis and compute a pose in node; return None if it cannot run."""
     node = shutil.which("node")
     if node is None or not os.path.exists(PACKAGE):
         return None
-    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps([state]), basis],
+    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps(state), basis],
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return tuple(json.loads(done.stdout)[0])
+    return tuple(json.loads(done.stdout))
 
 
 def crc64(data):
