@@ -44,8 +44,11 @@ supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *po
   const size_t modes = basis->info.mode_count;
   const size_t stride = (modes + 3) / 4 * 4;
   const size_t rows = basis->info.order > 0 ? basis->info.lung_count : 1;
-  if (!fits(basis) || !supine_basis_has_pose(basis, pose)) {
-    return fits(basis) ? SUPINE_ERROR_ARGUMENT : SUPINE_ERROR_UNSUPPORTED;
+  if (basis->info.cluster_count > 0) {
+    return SUPINE_ERROR_UNSUPPORTED;
+  }
+  if (!supine_basis_has_pose(basis, pose)) {
+    return SUPINE_ERROR_ARGUMENT;
   }
   if (supine_basis_expansion(basis, pose) > 0) {
     return SUPINE_ERROR_UNSUPPORTED;

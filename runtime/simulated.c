@@ -260,6 +260,22 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
   return SUPINE_OK;
 }
 
+supine_status supine_simulated_range(const supine_basis *basis, const double gravity[3],
+                                     supine_volume_kind kind, double range[2],
+                                     supine_error *error) {
+  double limits[SUPINE_LUNGS_MAX][2];
+  double origin[SUPINE_LUNGS_MAX];
+  range[0] = 0;
+  range[1] = 0;
+  SUPINE_TRY(supine_simulated_limits(basis, gravity, limits));
+  SUPINE_TRY(find_origin(basis, gravity, kind, origin, error));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    range[0] += limits[lung][0] - origin[lung];
+    range[1] += limits[lung][1] - origin[lung];
+  }
+  return SUPINE_OK;
+}
+
 /* Find the volumes of a state that names its lungs. */
 static supine_status named_volumes(const supine_basis *basis, const supine_state *state,
                                    double *volumes, supine_error *error) {

@@ -19,6 +19,13 @@
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]);
 
+/** Compute the lowest and the highest simulated volume of all lungs together for a direction of
+ * gravity, relative to the volume of a kind.
+ * @param range  supine_volume.ml of the lowest and of the highest volume, mL, written
+ * @retval SUPINE_ERROR_ARGUMENT  gravity is zero or not finite, or the file lacks this kind */
+supine_status supine_simulated_range(const supine_basis *basis, const double gravity[3],
+                                     supine_volume_kind kind, double range[2], supine_error *error);
+
 /** Find what is added to the fitted volume of each lung so that the lungs hold their own volumes in
  * the scan, in its posture, where the fit gives nearly these (supine_simulated.offset).
  * @param offsets  [lungs] mL, written

@@ -21,6 +21,3 @@ foreach(what colour glb pages) # pages.mjs holds all tests that need a browser
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()
 set_tests_properties(export_pages_node PROPERTIES COST 1000) # the longest test starts first
-add_test(NAME fuzz_page_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/numbers.mjs page
-  ${PROJECT_SOURCE_DIR}/program/view/page/basis.js)
-set_tests_properties(fuzz_page_node PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT "SUPINE=$<TARGET_FILE:supine>")

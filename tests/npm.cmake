@@ -12,7 +12,7 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
     set_tests_properties(npm_${where} PROPERTIES FIXTURES_REQUIRED npm_package TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT
       "SUPINE=$<TARGET_FILE:supine>;NATIVE=$<TARGET_FILE:npm_native>;TARBALL=${tarball};GOLDEN=${CMAKE_CURRENT_SOURCE_DIR}/golden/basis_lungs.safetensors;LUNGS=${PROJECT_SOURCE_DIR}/examples/lungs;README=${PROJECT_SOURCE_DIR}/README.md;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
   endforeach()
-  add_test(NAME fuzz_npm_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/numbers.mjs npm
+  add_test(NAME fuzz_npm_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/numbers.mjs
     ${PROJECT_BINARY_DIR}/runtime/js/package/supine.js)
   set_tests_properties(fuzz_npm_node PROPERTIES FIXTURES_REQUIRED npm_package TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>")

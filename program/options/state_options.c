@@ -156,6 +156,7 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
     status = supine_basis_pose(basis, &state, &reference->pose, &inner);
   }
   reference->state = state;
+  reference->scan = scan;
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
   }

@@ -88,6 +88,7 @@ typedef struct supine_from {
 typedef struct supine_options_reference_pose {
   supine_state state;
   supine_pose pose;
+  bool scan;     /* whether the state is that of the scan (supine_basis_scan_pose) */
   char name[96]; /* such as "the scan" or "supine at rest" */
 } supine_options_reference_pose;
 

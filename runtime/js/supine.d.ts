@@ -48,6 +48,19 @@ export interface Basis {
   /** Set the pose to a state, in a few microseconds. If the state is refused, the pose does not change.
    * @throws SupineError */
   pose(state: State): this;
+  /** Set the pose to that of the scan. For fields of another simulator it is the given surface.
+   * @throws SupineError */
+  poseScan(): this;
+  /** Compute the position of one vertex in the pose, mm. */
+  at(vertex: number): number[];
+  /** The uniforms supine_weights and supine_gains of supine.glsl in the pose. Throws if the basis has clusters. */
+  readonly uniforms: { weights: Float32Array; gains: Float32Array };
+  /** The texture supine_frames of supine.glsl in the pose, [clusters, 24]; undefined if the basis has no clusters. */
+  readonly frames: Float32Array | undefined;
+  /** Return the lowest and the highest volume of all lungs that another simulator computed for a direction of gravity,
+   * mL above that at rest, at full inflation or in the scan; undefined if the basis has no such volumes.
+   * @throws SupineError */
+  simulatedRange(gravity: ArrayLike<number>, kind: 'rest' | 'full' | 'scan'): number[] | undefined;
   /** Compute `positions` of the pose and return them. */
   deform(): Float32Array;
   /** Compute `positions` and `normals` of the pose and return `positions`. Normals are weighted sums of the file's
@@ -68,9 +81,24 @@ export class SupineError extends Error {
   readonly status: 'argument' | 'memory' | 'read' | 'format' | 'mesh' | 'open surface' | 'unsupported' | 'write' | 'numerical';
 }
 
-/** Open the bytes of a basis file: check all of them, and copy them.
- * @param options.wasm supine.wasm, as bytes or compiled, if it is not beside this module
- * @param options.allowFolds compute poses with volumes that lungs cannot hold, or at which the surface folds, instead of
- *   refusing them
+/** What `open` takes: the bytes of a basis file; a Blob or a Response with them; a path (in node) or an address. */
+export type Source = ArrayBufferLike | ArrayBufferView | Blob | Response | string | URL;
+
+export interface OpenOptions {
+  /** supine.wasm, as bytes or compiled, if it is not beside this module. */
+  wasm?: BufferSource | WebAssembly.Module;
+  /** Compute poses with volumes that lungs cannot hold, or at which the surface folds, instead of refusing them. */
+  allowFolds?: boolean;
+  /** Keep coefficients as in the file, instead of the smallest storage with an error of at most 0.005 mm. */
+  exact?: boolean;
+  /** Replace the checksum UNSEALED of a file that was made in memory by that of its content. */
+  seal?: boolean;
+}
+
+/** Metadata "checksum" of a file that `open` completes with its option `seal`. */
+export const UNSEALED: string;
+
+/** Open a basis file: check all of its bytes, and copy them. After a failure, for example to fetch supine.wasm, a further
+ * call tries again.
  * @throws SupineError */
-export function open(source: ArrayBufferLike | ArrayBufferView, options?: { wasm?: BufferSource | WebAssembly.Module; allowFolds?: boolean }): Promise<Basis>;
+export function open(source: Source | Promise<Source>, options?: OpenOptions): Promise<Basis>;

@@ -3,13 +3,28 @@
 // memory never grows and the arrays never move.
 
 // Bytes reserved for C structs and buffers.
-const STATE = 128, POSE = 8 * (256 + 3 * 16 + 1 + 16), VOLUMES = 8 * 16, TEXT = 512, VALUE = 32, ERROR = 4 + 512 + 4 + VALUE, OPTIONS = 16;
+const STATE = 128;
+const POSE = 8 * (256 + 3 * 16 + 1 + 16);
+const VOLUMES = 8 * 16;
+const TEXT = 512;
+const VALUE = 32;
+const ERROR = 4 + 512 + 4 + VALUE;
+const OPTIONS = 16;
+const EXACT = 1; // SUPINE_STORAGE_EXACT
+const FRAME = 24; // SUPINE_GL_FRAME_FLOATS
+const KINDS_OF_VOLUME = { rest: 1, full: 2, scan: 3 }; // supine_volume_kind
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
 const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
+const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a smaller gain';
+/** Metadata "checksum" of a file that open() completes (its option `seal`). */
+export const UNSEALED = 'xxh64:0000000000000000';
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
-const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array, Uint16Array]; // in the order of supine_dtype
-const STATUS = ['ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical'];
+// Types of tensors, in the order of supine_dtype.
+const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array, Uint16Array];
+const STATUS = [
+  'ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical',
+];
 
 export class SupineError extends Error {
   constructor(message, status) {
@@ -21,14 +36,61 @@ export class SupineError extends Error {
 
 const refusal = (message) => new SupineError(message, STATUS.indexOf('argument'));
 
-class Basis {
-  #c; #basis; #lit; #hasVolume; #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected;
+/** Return a state that was given as an object; refuse other values and unknown members. */
+function members(state) {
+  const isObject = typeof state === 'object' && state !== null;
+  if (!isObject || Array.isArray(state) || ArrayBuffer.isView(state)) {
+    throw refusal('a state must be a text such as prone:rest, or an object { gravity, volume }');
+  }
+  const unknown = Object.keys(state).find((key) => !['gravity', 'volume', 'gain'].includes(key));
+  if (unknown !== undefined) {
+    throw refusal(`a state has no member '${unknown}': give a text such as prone:rest, or { gravity, volume }`);
+  }
+  const { volume = '', gain } = state;
+  if (typeof volume !== 'string') throw refusal('the volume of a state must be a text such as rest+500');
+  if (gain !== undefined && volume !== '') throw refusal('a state has a volume and a gain: give one of them');
+  return state;
+}
 
-  constructor(instance, bytes, { allowFolds = false }) {
+/** Divide the sums of a target by the number of its vertices. */
+function meanOf({ count, at, move, expectedError, ...target }) {
+  const mean = move.map((x) => x / count);
+  const error = Math.sqrt(expectedError / count);
+  return { ...target, at: at.map((x) => x / count), move: mean, mm: Math.hypot(...mean), expectedError: error };
+}
+
+class Basis {
+  #c; #basis; #lit; #hasVolume; #uniforms; #frames;
+  #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected;
+
+  constructor(instance, bytes, options) {
     this.#c = instance.exports;
     this.#c._initialize();
+    this.#reserve();
+    this.#open(bytes, options);
+    const info = this.#c.supine_basis_get_info(this.#basis);
+    this.vertexCount = this.#word(info + INFO.vertices);
+    this.#positions = this.#allocate(12 * this.vertexCount);
+    this.#normals = this.#allocate(12 * this.vertexCount);
+    this.#expected = this.#allocate(4 * this.vertexCount);
+    this.#lit = this.#word(info + INFO.normals) > 0;
+    this.#readLungs(info);
+    this.#makeUniforms();
+
+    // The memory does not grow any more, so that these views stay valid.
+    this.positions = this.#view(Float32Array, this.#positions, 3 * this.vertexCount);
+    this.normals = this.#view(Float32Array, this.#normals, 3 * this.vertexCount);
+    this.vertices = this.tensor('vertices').data;
+    this.triangles = this.tensor('triangles').data;
+    this.#hasVolume = this.#view(Uint8Array, info + INFO.hasVolume, 1)[0] !== 0;
+    this.#readMetadata();
+    this.deform(); // the pose is still all 0: the reference surface
+  }
+
+  /** Reserve memory for C structs: first those with doubles, in sizes that are multiples of 8, for alignment. */
+  #reserve() {
     const size = 2 * (STATE + POSE) + VOLUMES + TEXT + ERROR;
-    this.#state = this.#allocate(size); // first the structs with doubles, in sizes that are multiples of 8, for alignment
+    this.#state = this.#allocate(size);
     this.#pose = this.#state + STATE;
     this.#nextState = this.#pose + POSE;
     this.#nextPose = this.#nextState + STATE;
@@ -36,37 +98,58 @@ class Basis {
     this.#text = this.#volumes + VOLUMES;
     this.#error = this.#text + TEXT;
     this.#view(Uint8Array, this.#state, size).fill(0);
+  }
+
+  /** Copy the bytes of a file, and open them. */
+  #open(bytes, { allowFolds, exact, seal }) {
     const file = this.#allocate(bytes.length);
     this.#view(Uint8Array, file, bytes.length).set(bytes);
+    if (seal) this.#seal(file, bytes.length);
     // A supine_basis_options: its size, then storage and simd, and the bools without_normals and allow_folds.
-    this.#view(Uint32Array, this.#volumes, 4).set([OPTIONS, 0, 0, allowFolds ? 1 << 8 : 0]);
-    this.#check(this.#c.supine_basis_open_memory_with(file, bytes.length, this.#volumes, this.#text, this.#error));
+    this.#view(Uint32Array, this.#volumes, 4).set([OPTIONS, exact ? EXACT : 0, 0, allowFolds ? 1 << 8 : 0]);
+    const { supine_basis_open_memory_with: open } = this.#c;
+    this.#check(open(file, bytes.length, this.#volumes, this.#text, this.#error));
     this.#basis = this.#word(this.#text);
-    const info = this.#c.supine_basis_get_info(this.#basis);
-    this.vertexCount = this.#word(info + INFO.vertices);
-    this.#positions = this.#allocate(12 * this.vertexCount);
-    this.#normals = this.#allocate(12 * this.vertexCount);
-    this.#expected = this.#allocate(4 * this.vertexCount);
+  }
 
-    // The memory does not grow any more, so that these views stay valid.
-    this.positions = this.#view(Float32Array, this.#positions, 3 * this.vertexCount);
-    this.normals = this.#view(Float32Array, this.#normals, 3 * this.vertexCount);
-    this.vertices = this.tensor('vertices').data;
-    this.triangles = this.tensor('triangles').data;
-    this.#lit = this.#word(info + INFO.normals) > 0;
-    this.#hasVolume = this.#view(Uint8Array, info + INFO.hasVolume, 1)[0] !== 0;
+  /** Replace the metadata "checksum" of a file that was made in memory, UNSEALED, by that of its content. */
+  #seal(at, size) {
+    const file = this.#view(Uint8Array, at, size);
+    const header = new TextDecoder('latin1').decode(file.subarray(8, 8 + this.#word(at)));
+    this.#check(this.#c.supine_safetensors_open_memory(at, size, this.#write('made'), this.#nextPose, this.#error));
+    const made = this.#word(this.#nextPose);
+    this.#c.supine_safetensors_print_checksum(made, this.#text);
+    this.#c.supine_safetensors_close(made);
+    const sealed = new Uint8Array(this.#c.memory.buffer);
+    sealed.copyWithin(at + 8 + header.indexOf(UNSEALED), this.#text, this.#text + UNSEALED.length);
+  }
+
+  #readLungs(info) {
     const lungs = this.#word(info + INFO.lungs);
     const [begin, names] = [this.#word(info + INFO.begin), this.#word(info + INFO.names)];
     this.lungs = {};
     for (let i = 0; i < lungs; ++i) {
-      this.lungs[this.#string(this.#word(names + 4 * i))] = [this.#word(begin + 4 * i), this.#word(begin + 4 * i + 4)];
+      const name = this.#string(this.#word(names + 4 * i));
+      this.lungs[name] = [this.#word(begin + 4 * i), this.#word(begin + 4 * i + 4)];
     }
+  }
+
+  #readMetadata() {
     this.metadata = {};
     const pairs = this.#c.supine_basis_all_metadata(this.#basis, this.#text);
     for (let at = pairs, end = pairs + 8 * this.#word(this.#text); at < end; at += 8) {
       this.metadata[this.#string(this.#word(at))] = this.#string(this.#word(at + 4));
     }
-    this.deform(); // the pose is still all 0: the reference surface
+  }
+
+  /** Reserve memory for what supine.glsl takes in a pose: weights and gains or, of clusters, frames. */
+  #makeUniforms() {
+    const [modes, , orders] = this.tensor('modes').shape;
+    const lungs = Object.keys(this.lungs).length;
+    const clusters = this.tensor('cluster_vectors')?.shape[0] ?? 0;
+    const weights = 4 * Math.ceil(modes / 4) * (orders > 1 ? lungs : 1);
+    this.#uniforms = clusters > 0 ? null : { weights, at: this.#allocate(4 * (weights + 3 * lungs)), gains: 3 * lungs };
+    this.#frames = { count: FRAME * clusters, at: this.#allocate(4 * FRAME * clusters + 4) };
   }
 
   tensor(name) {
@@ -74,7 +157,8 @@ class Basis {
     if (at === 0) return undefined;
     const [, type, rank, a, b, c, d, data] = this.#view(Uint32Array, at, 8);
     const shape = [a, b, c, d].slice(0, rank);
-    return { shape, data: this.#view(TYPES[type], data, shape.reduce((product, size) => product * size, 1)) };
+    const count = shape.reduce((product, size) => product * size, 1);
+    return { shape, data: this.#view(TYPES[type], data, count) };
   }
 
   pose(state) {
@@ -83,14 +167,56 @@ class Basis {
     if (fixed) this.#number(state.gain, 'gain');
     if (fixed) {
       const status = this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose);
-      this.#check(status, STATUS[status] === 'unsupported' ? 'displacements of this basis depend on the volume: give a volume instead of a gain'
-        : 'gravity is zero or not finite: give a vector with a direction');
+      const byVolume = 'displacements of this basis depend on the volume: give a volume instead of a gain';
+      const zero = 'gravity is zero or not finite: give a vector with a direction';
+      this.#check(status, STATUS[status] === 'unsupported' ? byVolume : zero);
       this.#c.supine_pose_fill(this.#nextPose, state.gain);
     } else {
       this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
     }
-    new Uint8Array(this.#c.memory.buffer).copyWithin(this.#state, this.#nextState, this.#nextState + STATE + POSE);
+    this.#take();
     return this;
+  }
+
+  poseScan() {
+    this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
+    this.#take();
+    return this;
+  }
+
+  /** Make the next state and pose the current ones. */
+  #take() {
+    const memory = new Uint8Array(this.#c.memory.buffer);
+    memory.copyWithin(this.#state, this.#nextState, this.#nextState + STATE + POSE);
+  }
+
+  at(vertex) {
+    const status = this.#c.supine_deform_range(this.#basis, this.#pose, vertex, vertex + 1, this.#text);
+    this.#check(status, `vertex ${vertex} is not one of 0 to ${this.vertexCount - 1}, or the pose is not finite`);
+    return Array.from(this.#view(Float32Array, this.#text, 3));
+  }
+
+  get uniforms() {
+    const { at, weights, gains } = this.#uniforms;
+    const status = this.#c.supine_gl_weights(this.#basis, this.#pose, at, at + 4 * weights);
+    this.#check(status, 'supine.glsl has no pose of the scan of collapsed lungs: give another state');
+    const [all, of] = [this.#view(Float32Array, at, weights), this.#view(Float32Array, at + 4 * weights, gains)];
+    return { weights: all.slice(), gains: of.slice() };
+  }
+
+  get frames() {
+    const { at, count } = this.#frames;
+    if (count === 0) return undefined;
+    this.#evaluate(this.#c.supine_gl_frames(this.#basis, this.#pose, at));
+    return this.#view(Float32Array, at, count).slice();
+  }
+
+  simulatedRange(gravity, kind) {
+    if (this.tensor('simulated_range') === undefined) return undefined;
+    this.#read({ gravity });
+    const { supine_simulated_range: find } = this.#c;
+    this.#check(find(this.#basis, this.#nextState, KINDS_OF_VOLUME[kind], this.#volumes, this.#error));
+    return Array.from(this.#view(Float64Array, this.#volumes, 2));
   }
 
   deform() {
@@ -109,7 +235,7 @@ class Basis {
   }
 
   get volumes() {
-    if (!this.#hasVolume) throw new SupineError('the surface is open and encloses no volume', STATUS.indexOf('open surface'));
+    if (!this.#hasVolume) this.#check(STATUS.indexOf('open surface'), 'the surface is open and encloses no volume');
     this.#evaluate(this.#c.supine_basis_volumes(this.#basis, this.#pose, this.#volumes));
     const volumes = this.#view(Float64Array, this.#volumes, 16);
     return Object.fromEntries(Object.keys(this.lungs).map((name, i) => [name, volumes[i]]));
@@ -139,13 +265,14 @@ class Basis {
   targets(since) {
     const after = this.deform().slice();
     const sigma = this.#expectedOrUnknown(since);
-    this.#check(since === undefined ? this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error)
-      : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+    this.#check(
+      since === undefined
+        ? this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error)
+        : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error),
+    );
     this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
-    const [part, names] = [this.tensor('part')?.data ?? [], this.tensor('names')?.data ?? new Uint8Array()];
-    const anatomy = this.tensor('anatomy')?.data ?? [];
-    const made = new TextDecoder().decode(names).split('\n').map((name, i) => ({ name, anatomy: anatomy[i] === 1, lung: '', at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 }));
-    part.forEach((index, v) => {
+    const made = this.#emptyTargets();
+    (this.tensor('part')?.data ?? []).forEach((index, v) => {
       const target = made[index];
       if (target.count++ === 0) target.lung = Object.keys(this.lungs).find((name) => v < this.lungs[name][1]);
       for (let k = 0; k < 3; ++k) {
@@ -155,34 +282,33 @@ class Basis {
       target.expectedError += sigma[v] ** 2;
     });
     this.deform();
-    return made.filter(({ count }) => count > 0).map(({ count, at, move, expectedError, ...target }) => {
-      const mean = move.map((x) => x / count);
-      return { ...target, at: at.map((x) => x / count), move: mean, mm: Math.hypot(...mean), expectedError: Math.sqrt(expectedError / count) };
-    });
+    return made.filter(({ count }) => count > 0).map(meanOf);
+  }
+
+  /** Return a target for each name of the file, with sums that are still 0. */
+  #emptyTargets() {
+    const names = new TextDecoder().decode(this.tensor('names')?.data ?? new Uint8Array()).split('\n');
+    const anatomy = this.tensor('anatomy')?.data ?? [];
+    const sums = () => ({ at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 });
+    return names.map((name, i) => ({ name, anatomy: anatomy[i] === 1, lung: '', ...sums() }));
   }
 
   /** Write a state to #nextState. The default posture is supine; the default volume is the default of the basis. */
   #read(state) {
     const isText = typeof state === 'string';
-    if (!isText && (typeof state !== 'object' || state === null || Array.isArray(state) || ArrayBuffer.isView(state))) {
-      throw refusal('a state must be a text such as prone:rest, or an object { gravity, volume }');
-    }
-    const unknown = isText ? undefined : Object.keys(state).find((key) => !['gravity', 'volume', 'gain'].includes(key));
-    if (unknown !== undefined) throw refusal(`a state has no member '${unknown}': give a text such as prone:rest, or { gravity, volume }`);
-    const { gravity = [0, 1, 0], volume = '' } = isText ? {} : state;
-    if (typeof volume !== 'string') throw refusal('the volume of a state must be a text such as rest+500');
-    if (state.gain !== undefined && volume !== '') throw refusal('a state has a volume and a gain: give one of them');
+    const { gravity = [0, 1, 0], volume = '' } = isText ? {} : members(state);
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
     const three = Array.from(gravity, Number);
     if (three.length !== 3) throw refusal('gravity must be three numbers');
     this.#view(Float64Array, this.#nextState, 3).set(three);
-    if (isText) this.#check(this.#c.supine_state_parse(this.#write(state), this.#nextState, this.#error));
-    else if (volume !== '') this.#check(this.#c.supine_state_parse_volume(this.#write(volume), this.#nextState, this.#error));
+    const { supine_state_parse: parse, supine_state_parse_volume: parseVolume } = this.#c;
+    if (isText) this.#check(parse(this.#write(state), this.#nextState, this.#error));
+    else if (volume !== '') this.#check(parseVolume(this.#write(volume), this.#nextState, this.#error));
   }
 
   #write(text) {
     const bytes = new TextEncoder().encode(`${text}\0`);
-    if (bytes.length > TEXT) throw new SupineError(`the text has ${bytes.length - 1} bytes: give at most ${TEXT - 1}`, STATUS.indexOf('argument'));
+    if (bytes.length > TEXT) throw refusal(`the text has ${bytes.length - 1} bytes: give at most ${TEXT - 1}`);
     this.#view(Uint8Array, this.#text, bytes.length).set(bytes);
     return this.#text;
   }
@@ -199,11 +325,11 @@ class Basis {
   }
 
   #evaluate(status) {
-    this.#check(status, 'the pose has a weight or a gain that is not finite: give a smaller gain');
+    this.#check(status, NOT_FINITE);
   }
 
   #number(value, name) {
-    if (!Number.isFinite(value)) throw new SupineError(`${name} is ${value}: give a finite number`, STATUS.indexOf('argument'));
+    if (!Number.isFinite(value)) throw refusal(`${name} is ${value}: give a finite number`);
   }
 
   #allocate(size) {
@@ -221,19 +347,55 @@ class Basis {
   }
 }
 
-let beside; // promise of the module compiled from supine.wasm beside this file
+let beside; // promise of the module compiled from supine.wasm beside this file; undefined if it failed
 
-async function load() {
-  const url = new URL('./supine.wasm', import.meta.url);
-  const files = url.protocol === 'file:' && globalThis.process?.getBuiltinModule?.('node:fs');
-  return WebAssembly.compile(files ? files.readFileSync(url) : await (await fetch(url)).arrayBuffer());
+/** Return the bytes of a file: read it in node, or fetch it. */
+async function read(path) {
+  const url = path instanceof URL ? path : undefined;
+  const isRemote = (url?.protocol ?? path).toString().startsWith('http');
+  const files = !isRemote && globalThis.process?.getBuiltinModule?.('node:fs');
+  try {
+    return files ? files.readFileSync(path) : await bytesOf(await fetch(path));
+  } catch (error) {
+    if (error instanceof SupineError) throw error;
+    throw new SupineError(`${path}: cannot be read: ${error.message}`, STATUS.indexOf('read'));
+  }
 }
 
-export async function open(source, { wasm, allowFolds = false } = {}) {
-  const bytes = ArrayBuffer.isView(source) ? new Uint8Array(source.buffer, source.byteOffset, source.byteLength) : new Uint8Array(source);
-  const module = wasm === undefined ? await (beside ??= load()) : wasm instanceof WebAssembly.Module ? wasm : await WebAssembly.compile(wasm);
+/** Return the bytes of what open() takes. */
+async function bytesOf(source) {
+  const given = await source;
+  if (typeof given === 'string' || given instanceof URL) return bytesOf(await read(given));
+  if (given?.ok === false) {
+    throw new SupineError(`${given.url}: the server says ${given.status}`, STATUS.indexOf('read'));
+  }
+  if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
+  if (/ArrayBuffer\]$/.test(Object.prototype.toString.call(given))) return new Uint8Array(given);
+  if (typeof given?.arrayBuffer === 'function') return new Uint8Array(await given.arrayBuffer());
+  throw refusal('open takes a path, the bytes of a basis file, a Blob, a Response, or a promise of one of them');
+}
+
+async function load() {
+  return WebAssembly.compile(await bytesOf(new URL('./supine.wasm', import.meta.url)));
+}
+
+/** Return the compiled library: what is given as `wasm`, or supine.wasm beside this file. */
+async function moduleOf(wasm) {
+  if (wasm instanceof WebAssembly.Module) return wasm;
+  if (wasm !== undefined) return WebAssembly.compile(wasm);
+  beside ??= load();
+  try {
+    return await beside;
+  } catch (error) {
+    beside = undefined; // the next call tries again
+    throw error;
+  }
+}
+
+export async function open(source, { wasm, allowFolds = false, exact = false, seal = false } = {}) {
+  const [bytes, module] = [await bytesOf(source), await moduleOf(wasm)];
   // The C library imports functions that write to files, for printf. Refuse every call.
   const none = () => 52; // the error ENOSYS of WASI
-  const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } });
-  return new Basis(instance, bytes, { allowFolds });
+  const imports = { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } };
+  return new Basis(await WebAssembly.instantiate(module, imports), bytes, { allowFolds, exact, seal });
 }

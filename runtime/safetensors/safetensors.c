@@ -93,6 +93,12 @@ void supine_safetensors_close(supine_safetensors *file) {
   supine_safetensors_release(file, file);
 }
 
+void supine_safetensors_print_checksum(const supine_safetensors *file, char text[CHECKSUM_SIZE]) {
+  (void)supine_print_text(text, CHECKSUM_SIZE, CHECKSUM_FORMAT,
+                          supine_safetensors_checksum(file->tensors, file->tensor_count,
+                                                      file->metadata, file->metadata_count));
+}
+
 supine_status supine_safetensors_verify(const supine_safetensors *file, supine_error *error) {
   const char *stated = supine_safetensors_metadata(file, "checksum");
   if (stated == NULL) {
@@ -101,9 +107,7 @@ supine_status supine_safetensors_verify(const supine_safetensors *file, supine_e
         "%s: no checksum, so another program wrote the file: make it with Supine", file->name);
   }
   char found[CHECKSUM_SIZE];
-  (void)supine_print_text(found, sizeof found, CHECKSUM_FORMAT,
-                          supine_safetensors_checksum(file->tensors, file->tensor_count,
-                                                      file->metadata, file->metadata_count));
+  supine_safetensors_print_checksum(file, found);
   return strcmp(stated, found) == 0
              ? SUPINE_OK
              : supine_error_set(error, SUPINE_ERROR_FORMAT,

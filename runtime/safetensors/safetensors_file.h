@@ -76,4 +76,7 @@ void supine_safetensors_print(FILE *file, const supine_tensor *tensors, size_t t
 uint64_t supine_safetensors_checksum(const supine_tensor *tensors, size_t tensor_count,
                                      const supine_metadata *metadata, size_t metadata_count);
 
+/** Print the checksum of the content of a file, as its metadata "checksum" should state it. */
+void supine_safetensors_print_checksum(const supine_safetensors *file, char text[CHECKSUM_SIZE]);
+
 #endif

@@ -79,7 +79,7 @@ async function checkTable(page) {
       assert.ok(far > 0.5 && Math.abs(far - parseFloat(mm)) < WRITTEN_MM, `${name}: ${mm}, not ${far}`);
       assert.equal(words === `within its error of ${parseFloat(error).toFixed(1)}`, far <= parseFloat(error), `${name}: ${words} ${error}`);
     }
-    const told = await page.evaluate(() => { const { sentenceOf, movedBetween, targetOf, basis: b, state } = window.supine; const moved = movedBetween(b, state.moment, state.from); return b.inside.names.map((_, part) => { const target = targetOf(b.inside, part, moved); return [target.mm > target.error, sentenceOf(b, moved, target, state.gravity, '').told !== '']; }); });
+    const told = await page.evaluate(() => { const { sentenceOf, movedBetween, basis: b, state } = window.supine; const moved = movedBetween(b, state.moment, state.from); return moved.targets.map((target) => [target.mm > target.error, sentenceOf(b, moved, target, state.gravity, '').told !== '']); });
     for (const [above, emphasised] of told) assert.equal(emphasised, above); // nothing is emphasised below its expected error
     const large = await page.evaluate(() => window.supine.basis.inside.anatomy.map((part) => window.supine.basis.inside.names[part]));
     const [name, mm] = rows.filter(([who]) => !large.includes(who)).sort((a, b) => parseFloat(b[1]) / parseFloat(b[3]) - parseFloat(a[1]) / parseFloat(a[3]))[0]; // the target that is told of first

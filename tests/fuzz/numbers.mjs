@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzz the numbers of basis files in JavaScript: node numbers.mjs page BASIS_JS, or node numbers.mjs npm SUPINE_JS.
-// Each case changes one tensor or one metadata string of a sound file, and then corrects the checksum. `npm` opens the
-// file with the JavaScript package, which must refuse it or give finite results. `page` gives the numbers to the
-// functions of the page, which must end and give finite results, or say that the surface folds. A worker runs the cases,
-// so that one that does not end is found. The environment variable SUPINE is the path of the program.
+// Fuzz the numbers of basis files in JavaScript: node numbers.mjs SUPINE_JS. Each case changes one tensor or one metadata
+// string of a sound file, and then corrects the checksum. The JavaScript package, which the page uses too, must refuse the
+// file or give finite results. A worker runs the cases, so that one that does not end is found. The environment variable
+// SUPINE is the path of the program.
 import assert from 'node:assert/strict';
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -151,32 +150,9 @@ async function tryPackage(path) {
   };
 }
 
-/** Return a function that tries the numbers of a file with the functions of the page. */
-async function tryPage(path) {
-  const { momentFor } = new Function(`${readFileSync(path, 'utf8')}\nreturn { momentFor };`)();
-  return async ({ metadata, tensors }) => {
-    const numbers = (name) => tensors[name]?.numbers;
-    const listed = (key) => (metadata[key] ?? '0,0,0').split(',').map(Number);
-    const [modes, terms] = tensors.modes.shape;
-    const basis = {
-      metadata, modes, band: Math.sqrt(terms) - 1, mixes: numbers('modes'), linear: numbers('volume_linear'),
-      quadratic: numbers('volume_quadratic'), cubic: numbers('volume_cubic'), fields: false,
-      resting: numbers('resting_volume'), byLung: true, scanVolume: 0, references: listed('reference_volume_ml'), bend: listed('bend'),
-    };
-    for (const gravity of GRAVITIES) {
-      for (const depth of [0, 500, -300, 1500]) {
-        const unit = gravity.map((x) => x / Math.hypot(...gravity));
-        const { folds, gains } = momentFor(basis, unit, depth);
-        assert.ok(folds || finite(gains), 'finite gains, or a surface that folds');
-      }
-    }
-    return 'opened';
-  };
-}
-
 async function work() {
-  const { kind, path, files } = workerData;
-  const attempt = await (kind === 'npm' ? tryPackage(path) : tryPage(path));
+  const { path, files } = workerData;
+  const attempt = await tryPackage(path);
   const sound = files.map((file) => parse(readFileSync(file)));
   parentPort.on('message', async ({ file, one }) => {
     try {
@@ -203,15 +179,15 @@ function ask(worker, file, one) {
 
 async function main() {
   const { folder, skip, supine } = await import('../export/support.mjs');
-  const [kind, path] = process.argv.slice(2);
+  const [path] = process.argv.slice(2);
   if (!existsSync(path)) skip(`no ${path}`);
   const [mesh, lungs, points, inside] = ['lungs.ply', 'lungs.safetensors', 'points.csv', 'inside.safetensors'].map((name) => join(folder, name));
   supine('phantom', '--vertices', '100', '-o', mesh);
   supine('precompute', mesh, '--band', '3', '-o', lungs);
   writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
   supine('embed', lungs, points, '-o', inside);
-  const files = kind === 'npm' ? [lungs, inside] : [lungs];
-  const worker = new Worker(new URL(import.meta.url), { workerData: { kind, path, files } });
+  const files = [lungs, inside];
+  const worker = new Worker(new URL(import.meta.url), { workerData: { path, files } });
   const verdicts = { opened: 0, refused: 0 };
   try {
     for (const [i, file] of files.entries()) {
@@ -224,7 +200,7 @@ async function main() {
   } finally {
     await worker.terminate();
   }
-  console.log(`${kind}: ${verdicts.opened} files opened, ${verdicts.refused} refused`);
+  console.log(`${verdicts.opened} files opened, ${verdicts.refused} refused`);
 }
 
 if (isMainThread) await main();

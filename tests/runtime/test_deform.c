@@ -510,6 +510,30 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
+/* A shader that reads coefficients from a texture takes weights of more modes than attributes hold.
+ */
+TEST(test_gl_weights_many_modes_all_written) {
+  enum { VERTICES = 20, MODES = 41, SLOTS = 44 };
+  opened o = made(fixture_create(VERTICES, MODES, 1, 2, true, false, 3, 17));
+  supine_basis *basis = open_as(&o, SUPINE_STORAGE_EXACT, SUPINE_SIMD_AUTO);
+  float attributes[VERTICES * (SUPINE_GL_VECTOR_FLOATS + 3 * MODES)];
+  float uniforms[SLOTS];
+  float gains[6];
+  double weights[MODES];
+  const double scales[2] = {1.25, 0.75};
+  for (size_t k = 0; k < MODES; ++k) {
+    weights[k] = 0.5 * (double)k - 7.25;
+  }
+  assert_int_equal(supine_gl_pack(basis, 0, VERTICES, attributes), SUPINE_ERROR_UNSUPPORTED);
+  assert_int_equal(supine_gl_weights(basis, POSED(basis, weights, scales), uniforms, gains),
+                   SUPINE_OK);
+  for (size_t k = 0; k < SLOTS; ++k) {
+    assert_true(uniforms[k] == (k < MODES ? (float)weights[k] : 0.0F));
+  }
+  supine_basis_close(basis);
+  drop(&o);
+}
+
 /* Five weights leave three components of two vec4s unused; these are set to 0. */
 TEST(test_gl_weights_unused_slots_zero) {
   enum { VERTICES = 40, MODES = 5, SLOTS = 8, FLOATS = SUPINE_GL_FLOATS + MODES };

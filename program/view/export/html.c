@@ -11,11 +11,16 @@
 #include "program/view/export/packed.h"
 #include "program/view/export/template.h"
 #include "program/view/render/render.h"
-#include "runtime/expected.h"
 
 extern const supine_asset supine_export_assets[]; /* the files of program/view/page */
 
 enum { STORED_MAX = 32767, MODES_MAX = 128 /* meshoptimizer compresses rows of up to 256 bytes */ };
+
+/* Tensors of 64-bit floats that the basis of the surface and that of the structures inside it have
+ * in common. */
+static const char *const shared[] = {
+    "modes",        "volume_linear", "volume_quadratic", "volume_cubic",     "resting_volume",
+    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares"};
 
 /* State while a page is printed. The page stores positions and coefficients as 16-bit integers,
  * which the browser multiplies by a quantisation step. */
@@ -175,35 +180,42 @@ static void find_steps(page *p) {
   }
 }
 
-/* Add the tensors of 64-bit floats, such as modes and volume coefficients, uncompressed. */
-static supine_status add_doubles(page *p) {
-  static const char *const names[] = {
-      "modes",        "resting_volume",  "volume_linear",    "volume_quadratic",
-      "volume_cubic", "simulated_range", "simulated_limits", "simulated_shares"};
-  for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
-    const supine_tensor *tensor = supine_basis_tensor(p->basis, names[i]);
+/* Add a tensor of 64-bit floats, uncompressed, as the page's tensor `name`. */
+static supine_status add_doubles(page *p, const char *name, const supine_tensor *tensor) {
+  size_t bytes = sizeof(double);
+  for (size_t axis = 0; axis < tensor->rank; ++axis) {
+    bytes *= tensor->shape[axis];
+  }
+  return add_tensor(p, name, tensor->data, bytes);
+}
+
+/* Add the tensors that the surface shares with the structures inside it, such as modes and volume
+ * coefficients. */
+static supine_status add_shared(page *p) {
+  for (size_t i = 0; i < sizeof shared / sizeof *shared; ++i) {
+    const supine_tensor *tensor = supine_basis_tensor(p->basis, shared[i]);
     if (tensor != NULL) {
-      size_t bytes = sizeof(double);
-      for (size_t axis = 0; axis < tensor->rank; ++axis) {
-        bytes *= tensor->shape[axis];
-      }
-      SUPINE_TRY(add_tensor(p, names[i], tensor->data, bytes));
+      SUPINE_TRY(add_doubles(p, shared[i], tensor));
     }
   }
   return SUPINE_OK;
 }
 
-/* Add the sums with which the page of a simplified surface computes expected errors. */
+/* Add the sums and the box from which the library computes the expected errors of a simplified
+ * surface: those of the whole one. */
 static supine_status add_squares(page *p) {
   const supine_basis_info *info = p->info;
   const size_t count = 3 * info->lung_count * info->mode_count * info->mode_count;
+  double box[2][3] = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
   SUPINE_ARENA arena = {0};
   double *squares = supine_arena_take(&arena, count, sizeof *squares);
   if (squares == NULL) {
     return SUPINE_ERROR_MEMORY;
   }
   supine_export_squares(p->basis, squares);
-  return add_tensor(p, "squares", squares, count * sizeof *squares);
+  supine_render_box(info->vertices, info->vertex_count, box[0], box[1]);
+  SUPINE_TRY(add_tensor(p, "lungs_box", box, sizeof box));
+  return add_tensor(p, "lungs_squares", squares, count * sizeof *squares);
 }
 
 /* Return the 256 colours of each colour map as hexadecimal digits. */
@@ -245,83 +257,81 @@ static json_t *describe_inside(const page *p) {
     }
   }
   const supine_tensor *rigid = supine_basis_tensor(p->shown->inside, "rigid");
-  json_t *parts = json_array();
-  if (rigid != NULL) {
-    for (size_t i = 0; i < rigid->shape[0]; ++i) {
-      const uint32_t first = ((const uint32_t *)rigid->data)[2 * i];
-      (void)json_array_append_new(parts, json_integer((json_int_t)p->shown->names->part[first]));
-    }
+  json_t *ranges = json_array();
+  const uint32_t *vertex = rigid != NULL ? rigid->data : NULL;
+  const size_t ends = rigid != NULL ? 2 * rigid->shape[0] : 0;
+  for (size_t i = 0; i < ends; ++i) {
+    (void)json_array_append_new(ranges, json_integer((json_int_t)vertex[i]));
   }
-  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:o, s:f}", "vertices",
+  return json_pack("{s:I, s:I, s:o, s:o, s:o, s:o, s:f, s:o}", "vertices",
                    (json_int_t)info->vertex_count, "triangles", (json_int_t)info->triangle_count,
-                   "lungBegin", begins(info, info->lung_begin), "names", names, "rigid", parts,
-                   "anatomy", anatomy, "unit", p->inside_step);
+                   "lungBegin", begins(info, info->lung_begin), "names", names, "rigidRanges",
+                   ranges, "anatomy", anatomy, "unit", p->inside_step, "metadata",
+                   supine_options_json_metadata(p->shown->inside));
 }
 
-/* Return the volume of all lungs in the scan minus that of the reference surface, mL; 0 if the pose
- * of the scan cannot be computed. Of collapsed lungs it is that of the collapsed lung at the
- * inflation of the scan, as the page moves lungs by modes alone. */
-static double scan_volume(const page *p) {
-  const supine_state scan = supine_basis_scan(p->basis);
-  double held[SUPINE_LUNGS_MAX];
-  double beyond = 0;
-  supine_pose pose;
-  supine_error error;
-  if (supine_basis_pose(p->basis, &scan, &pose, &error) != SUPINE_OK) {
-    return 0;
-  }
-  memset(pose.expansion, 0, sizeof pose.expansion);
-  (void)supine_basis_volumes(p->basis, &pose, held);
-  for (size_t lung = 0; lung < p->info->lung_count; ++lung) {
-    beyond += held[lung] - p->info->reference_volume[lung];
-  }
-  return beyond;
-}
-
-/* Return the states from which displacements can be measured, as JSON. */
+/* Return the states from which displacements can be measured, as JSON: the text of a state, or null
+ * for the scan. */
 static json_t *describe_froms(const page *p) {
   json_t *list = json_array();
-  const size_t weights = p->info->mode_count * (p->info->order > 0 ? p->info->lung_count : 1);
   for (size_t i = 0; i < p->shown->from_count; ++i) {
     const supine_options_reference_pose *from = &p->shown->from[i];
-    const supine_volume volume = from->state.volume;
-    const bool rest = from->state.lung_count == 0 &&
-                      (volume.kind == SUPINE_VOLUME_REST || volume.kind == SUPINE_VOLUME_DEFAULT);
+    char state[160];
+    (void)supine_state_print(&from->state, state, sizeof state);
     (void)json_array_append_new(
-        list, json_pack("{s:s, s:o, s:o, s:o, s:o}", "name", from->name, "gravity",
-                        supine_options_json_numbers(3, from->state.gravity), "above",
-                        rest ? json_real(volume.ml) : json_null(), "weights",
-                        supine_options_json_numbers(weights, from->pose.weights), "gains",
-                        supine_options_json_numbers(3 * p->info->lung_count, from->pose.gains[0])));
+        list, json_pack("{s:s, s:o, s:o}", "name", from->name, "gravity",
+                        supine_options_json_numbers(3, from->state.gravity), "state",
+                        from->scan ? json_null() : json_string(state)));
   }
   return list;
 }
 
-static json_t *describe(const page *p) {
+/* Describe the vertices, modes and lungs of the surface as the page stores them. */
+static json_t *describe_surface(const page *p) {
   const supine_basis_info *info = p->info;
   return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:o, s:o, s:o, s:f, s:f, "
-      "s:o, s:o, s:o, s:f, s:o, s:{s:f, s:f, s:f, s:f, s:f}}",
-      "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
-      (json_int_t)info->vertex_count, "triangles",
-      (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:f, s:o}", "vertices",
+      (json_int_t)p->order.vertex_count, "wholeVertices", (json_int_t)info->vertex_count,
+      "triangles", (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
       (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count, "band",
       (json_int_t)info->band, "order", (json_int_t)info->order, "vector", (int)info->vector,
       "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
-      begins(info, p->order.corner_begin), "hasResting", (int)info->has_rest, "colours", colours(),
-      "breathVolume", p->shown->breath, "metadata", supine_options_json_metadata(p->basis), "title",
-      supine_options_json_text(p->shown->title), "middle",
+      begins(info, p->order.corner_begin), "hasRest", (int)info->has_rest, "middle",
       supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
-      p->coefficient_step, "inside", describe_inside(p), "froms", describe_froms(p), "references",
-      supine_options_json_numbers(info->lung_count, info->reference_volume), "scanVolume",
-      scan_volume(p), "bend", supine_options_json_numbers(3, info->bend), "expected", "constant",
-      SUPINE_EXPECTED_ERROR_MM, "fullBreath", EXPECTED_FULL_BREATH, "heart", EXPECTED_HEART,
-      "sliding", EXPECTED_SLIDING, "spread", EXPECTED_SPREAD);
+      p->coefficient_step, "references",
+      supine_options_json_numbers(info->lung_count, info->reference_volume));
+}
+
+static json_t *describe(const page *p) {
+  json_t *text = describe_surface(p);
+  json_t *more = json_pack("{s:o, s:f, s:o, s:o, s:o, s:o}", "colours", colours(), "breathVolume",
+                           p->shown->breath, "metadata", supine_options_json_metadata(p->basis),
+                           "title", supine_options_json_text(p->shown->title), "inside",
+                           describe_inside(p), "froms", describe_froms(p));
+  (void)json_object_update_missing(text, more);
+  json_decref(more);
+  return text;
+}
+
+/* Add what the library needs to know of the structures inside the lungs. */
+static supine_status add_inside(page *p) {
+  const supine_basis_info *inside = p->inside;
+  const uint32_t *part = p->shown->names->part;
+  SUPINE_TRY(add_rows(p, "inside-vertices", inside, 1, 3, place_row));
+  SUPINE_TRY(add_rows(p, "inside-coefficients", inside, 3, inside->mode_count, coefficient_row));
+  SUPINE_TRY(add_corners(p, "inside-triangles", inside->triangles, 3 * inside->triangle_count,
+                         inside->vertex_count));
+  if (supine_basis_tensor(p->shown->inside, "lungs_squares") != NULL) {
+    SUPINE_TRY(add_doubles(p, "inside-lungs_squares",
+                           supine_basis_tensor(p->shown->inside, "lungs_squares")));
+    SUPINE_TRY(
+        add_doubles(p, "inside-lungs_box", supine_basis_tensor(p->shown->inside, "lungs_box")));
+  }
+  return add_tensor(p, "inside-parts", part, inside->vertex_count * sizeof *part);
 }
 
 static supine_status add_tensors(page *p) {
   const supine_basis_info *info = p->info;
-  const supine_basis_info *inside = p->inside;
   SUPINE_TRY(add_rows(p, "vertices", info, 1, 3, place_row));
   if (!info->vector) {
     SUPINE_TRY(add_rows(p, "direction", info, 1, 4, direction_row));
@@ -333,19 +343,11 @@ static supine_status add_tensors(page *p) {
   }
   SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],
                          p->order.vertex_count));
-  SUPINE_TRY(add_doubles(p));
+  SUPINE_TRY(add_shared(p));
   if (p->shown->simplify > 0) {
     SUPINE_TRY(add_squares(p));
   }
-  if (inside == NULL) {
-    return SUPINE_OK;
-  }
-  SUPINE_TRY(add_rows(p, "inside-vertices", inside, 1, 3, place_row));
-  SUPINE_TRY(add_rows(p, "inside-coefficients", inside, 3, inside->mode_count, coefficient_row));
-  SUPINE_TRY(add_corners(p, "inside-triangles", inside->triangles, 3 * inside->triangle_count,
-                         inside->vertex_count));
-  return add_tensor(p, "inside-parts", p->shown->names->part,
-                    inside->vertex_count * sizeof *p->shown->names->part);
+  return p->inside != NULL ? add_inside(p) : SUPINE_OK;
 }
 
 static void free_page(page *p) {

@@ -35,28 +35,10 @@ static void find_amounts(const export_targets *targets, const supine_pose *pose,
   }
 }
 
-/* Find the lowest and the highest volume of all lungs that was simulated for a direction of
- * gravity, mL above that of the reference surface. */
-static supine_status find_simulated(const supine_basis *basis, const double g[3], double range[2]) {
-  double limits[SUPINE_LUNGS_MAX][2];
-  range[0] = range[1] = 0;
-  SUPINE_TRY(supine_simulated_limits(basis, g, limits));
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    range[0] += limits[lung][0];
-    range[1] += limits[lung][1];
-  }
-  return SUPINE_OK;
-}
-
-/* Compute the pose of another simulator's fields at a volume of all lungs, mL above that of the
- * reference surface. */
-static supine_status pose_at_total(const supine_basis *basis, const double g[3], double total,
-                                   supine_pose *pose, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {SUPINE_VOLUME_ABSOLUTE, total}};
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    state.volume.ml += info->reference_volume[lung];
-  }
+/* Compute the pose at a volume of all lungs, mL above that in the scan. */
+static supine_status pose_at(const supine_basis *basis, const double g[3], double ml,
+                             supine_pose *pose, supine_error *error) {
+  const supine_state state = {.gravity = {g[0], g[1], g[2]}, .volume = {SUPINE_VOLUME_SCAN, ml}};
   return supine_basis_pose(basis, &state, pose, error);
 }
 
@@ -67,7 +49,7 @@ static supine_status simulated_breath(const supine_basis *basis, double breath, 
   const supine_state start = supine_options_breath_state(basis, g, 0);
   double range[2];
   double begin = 0;
-  SUPINE_TRY(find_simulated(basis, g, range));
+  SUPINE_TRY(supine_simulated_range(basis, g, SUPINE_VOLUME_SCAN, range, error));
   if (supine_basis_pose(basis, &start, pose, NULL) == SUPINE_OK) {
     double volumes[SUPINE_LUNGS_MAX];
     SUPINE_TRY(supine_basis_volumes(basis, pose, volumes));
@@ -77,7 +59,7 @@ static supine_status simulated_breath(const supine_basis *basis, double breath, 
   }
   begin = fmax(range[0], fmin(begin, range[1] - breath));
   const double total = fmin(range[1], begin + fraction * breath);
-  return pose_at_total(basis, g, total, pose, error);
+  return pose_at(basis, g, total, pose, error);
 }
 
 supine_status supine_export_breath_pose(const supine_basis *basis, double breath, const double g[3],
@@ -107,9 +89,8 @@ static supine_status sample_pose(const export_targets *targets, const double g[3
                                  supine_pose *pose, supine_error *error) {
   if (targets->info->order > 0) {
     double range[2];
-    SUPINE_TRY(find_simulated(targets->basis, g, range));
-    return pose_at_total(targets->basis, g, range[0] + fraction * (range[1] - range[0]), pose,
-                         error);
+    SUPINE_TRY(supine_simulated_range(targets->basis, g, SUPINE_VOLUME_SCAN, range, error));
+    return pose_at(targets->basis, g, range[0] + fraction * (range[1] - range[0]), pose, error);
   }
   return supine_export_breath_pose(targets->basis, targets->breath, g, fraction, pose, error);
 }

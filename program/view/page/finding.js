@@ -5,9 +5,6 @@
  * deviation), by posture. */
 const PUBLISHED = { left: 'left 0 % (SD 44), right +25 % (SD 11); Little 2021, n\u00a010' };
 
-/** Return the volume (gas plus tissue) of each lung, mL. */
-const heldBy = (basis, moment) => basis.references.map((ml, lung) => ml + formAt(lungForm(basis, lung, weightsOf(basis, moment, lung)), moment.gains.slice(3 * lung, 3 * lung + 3)));
-
 /** Return a weight for each vertex, proportional to the area of the triangles around it. */
 function areasOf({ surface, corners, vertices }) {
   const areas = new Float32Array(vertices);
@@ -40,107 +37,33 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at };
 }
 
-/** Return, for each lung and axis, the sums over its vertices of the products of their displacements by two modes at
- * weight and gain 1, divided by the number of all vertices: matrices [lungs, 3, modes, modes], mm^2. The page of a
- * simplified surface has those of the whole one. */
-function squaresOf(basis) {
-  const { modes, vertices } = basis;
-  const sums = new Float64Array(basis.lungs * 3 * modes * modes);
-  const by = Array.from({ length: modes }, () => [0, 0, 0]);
-  for (let v = 0, lung = 0; v < vertices; ++v) {
-    while (v >= basis.lungBegin[lung + 1]) ++lung;
-    by.forEach((displacement, k) => modeOf(basis, v, k, displacement));
-    for (let axis = 0, at = 3 * lung * modes * modes; axis < 3; ++axis) {
-      for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sums[at] += (by[k][axis] * by[l][axis]) / vertices;
-    }
-  }
-  return sums;
+/** Return the RMS over the surface of the expected error of the displacement between two moments, mm; null if it is
+ * unknown, as in another simulator's fields. */
+function surfaceError({ library, metadata }, now, from) {
+  if (!metadata.expected_error_mm) return null;
+  const sigma = pose(library, now).expectedError(from.state);
+  return Math.sqrt(sigma.reduce((sum, x) => sum + x * x, 0) / sigma.length);
 }
 
-/** Return the RMS over the vertices of the surface of their distance between two states of the lungs, mm, without a pass
- * over the vertices. */
-function rmsBetween(basis, now, from) {
-  basis.squares ??= basis.wholeVertices > basis.vertices ? takeTensor('squares', Float64Array) : squaresOf(basis);
-  const { modes, squares } = basis;
-  let sum = 0;
-  for (let row = 0, at = 0; row < 3 * basis.lungs; ++row) {
-    const [to, past] = [now, from].map((moment) => weightsOf(basis, moment, Math.floor(row / 3)));
-    const by = Float64Array.from({ length: modes }, (_, k) => now.gains[row] * to[k] - from.gains[row] * past[k]);
-    for (let k = 0; k < modes; ++k) for (let l = 0; l < modes; ++l, ++at) sum += by[k] * by[l] * squares[at];
-  }
-  return Math.sqrt(Math.max(0, sum));
-}
-
-/** Return the RMS over points of the expected error of their displacement u, mm. The squared error of a point is the
- * sum of the terms of supine/locate.h: of u itself; of u minus its part `level`, without a turn; of a volume at rest that
- * is only assumed, by the change of u if the volumes of the states that count from rest grow by 1 % of the reference
- * volume; beside the heart; and sideways. `places(moment)` returns the points in a state of the lungs, `reference` has
- * their reference positions, and `terms` is the result of termsBetween. */
-function expectedError({ now, from, law, turn: turning, level, perStep, fuller, heart, sliding }, places, reference) {
-  const [a, b] = [places(now), places(from)];
-  const [more, flat] = [fuller?.map(places), level?.map(places)];
-  let sum = 0;
-  for (let i = 0; i < a.length; i += 3) {
-    let [square, slope, turned] = [0, 0, 0];
-    for (let k = i; k < i + 3; ++k) {
-      const u = a[k] - b[k];
-      square += u * u;
-      if (more) slope += (more[0][k] - more[1][k] - u) ** 2;
-      if (flat) turned += (u - flat[0][k] + flat[1][k]) ** 2;
-    }
-    sum += law * Math.sqrt(square) + turning * Math.sqrt(turned) + perStep ** 2 * slope + heart(reference.subarray(i, i + 3)) ** 2 + sliding ** 2;
-  }
-  return Math.sqrt(sum / (a.length / 3));
-}
-
-/** Return a function that computes, from a reference position, the error beside the heart, mm, for a change of gravity
- * by `across` across the body. */
-function heartError({ metadata, expected, torso: { low, high } }, across) {
-  const middle = Number(metadata.midline_mm);
-  return ([x, y, z]) => {
-    const width = x > middle ? high[0] - middle : middle - low[0];
-    const share = (v, axis) => (high[axis] > low[axis] ? (high[axis] - v) / (high[axis] - low[axis]) : 0.5);
-    const [out, back, down] = [width > 0 ? Math.abs(x - middle) / width : 0, share(y, 1), share(z, 2)];
-    return expected.heart * across * Math.max(0, 1 - out / 0.7) * Math.max(0, 4 * back * (1 - back)) * Math.max(0, 1 - Math.abs(down - 0.65) / 0.35);
-  };
-}
-
-/** Return what expectedError needs for the displacement from the state `from` to the state `now`. `known`: whether the
- * error is known. The cost does not depend on the number of vertices, so that every frame can have its own terms. */
-function termsBetween(basis, now, from) {
-  const { metadata, expected } = basis;
-  const rms = rmsBetween(basis, now, from);
-  const number = (key, usual) => (Number(metadata[key]) > 0 ? Number(metadata[key]) : usual);
-  const full = Math.min(1, rms / expected.fullBreath);
-  const law = number('expected_error_mm', expected.constant) * Math.min(1, rms / number('expected_error_from_mm', expected.fullBreath));
-  const turning = metadata.turn_fitted ? 0 : Math.max(0, expected.constant * full - law);
-  const scan = (metadata.scan_gravity ?? '0,1,0').split(',').map(Number);
-  const volume = sumOf(basis.references);
-  const assumed = basis.hasResting && !metadata.resting_known && metadata.scanned !== 'rest' && !metadata.scan_state?.includes('rest');
-  const at = (gravity, more) => [momentFor(basis, gravity ?? now.gravity, now.above + more), from.above === null ? from : momentFor(basis, gravity ?? from.gravity, from.above + more)];
-  const change = unit(now.gravity).map((x, i) => x - unit(from.gravity)[i]);
-  return {
-    now, from, law, turn: turning, level: turning > 0 ? at(scan, 0) : null, fuller: assumed ? at(null, 0.01 * volume) : null,
-    perStep: assumed ? (number('resting_spread', expected.spread) * (volume + restFor(basis, scan))) / volume / 0.01 : 0, heart: heartError(basis, Math.hypot(change[0], change[1])), sliding: expected.sliding * Math.abs(change[0]),
-    known: Boolean(metadata.expected_error_mm && now.held),
-  };
-}
-
-/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, and the result of
- * termsBetween. `error` is that of the surface, mm; null if it is unknown. */
+/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, the expected error
+ * of the surface, mm, or null, and the result of targetsBetween. */
 function movedBetween(basis, now, from) {
-  const places = (moment) => placesOf(basis, moment);
-  const terms = termsBetween(basis, now, from);
-  return { ...distancesOf(basis, places(now), places(from)), ...terms, error: terms.known ? expectedError(terms, places, basis.surface) : null };
+  const distances = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
+  const targets = basis.inside ? targetsBetween(basis.inside, now, from) : [];
+  return { ...distances, now, from, targets, error: surfaceError(basis, now, from) };
 }
 
-/** Return how a structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
- * displacement and distance, mm, and the expected error, null if it is unknown. */
-function targetOf(inside, part, moved) {
-  const mean = (places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length);
-  const [at, was] = [moved.now, moved.from].map((moment) => mean(insidePlaces(inside, moment, part)));
-  const move = at.map((x, i) => x - was[i]);
-  return { name: inside.names[part] || '(no name)', at, was, move, mm: Math.hypot(...move), error: moved.known ? expectedError(moved, (moment) => insidePlaces(inside, moment, part).flat(), Float32Array.from(inside.members[part].flatMap((v) => [...inside.reference.subarray(4 * v, 4 * v + 3)]))) : null };
+/** Return how each structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
+ * displacement `move` and distance `mm`, and the expected error, null if it is unknown. */
+function targetsBetween(inside, now, from) {
+  const found = pose(inside.library, now).targets(from.state);
+  const none = { name: '', at: [0, 0, 0], was: [0, 0, 0], move: [0, 0, 0], mm: 0, error: 1 };
+  return inside.members.map((members) => {
+    if (!members.length) return none;
+    const { name, at, move, mm, expectedError } = found.shift();
+    const error = Number.isNaN(expectedError) ? null : expectedError;
+    return { name: name || '(no name)', at, was: at.map((x, i) => x - move[i]), move, mm, error };
+  });
 }
 
 /** Return whether a displacement exceeds its expected error. */
@@ -151,10 +74,7 @@ const withinWords = (error) => `within its error of ${error.toFixed(1)}`;
 /** Return the index of the target to tell of first: that with the largest displacement, in multiples of its expected
  * error. Targets come before anatomy. */
 function firstTarget(inside, moved) {
-  const ratios = inside.names.map((_, part) => {
-    const { mm, error } = inside.members[part].length ? targetOf(inside, part, moved) : { mm: 0, error: 1 };
-    return [inside.anatomy.includes(part) ? 0 : 1, mm / (error ?? 1)];
-  });
+  const ratios = moved.targets.map(({ mm, error }, part) => [inside.anatomy.includes(part) ? 0 : 1, mm / (error ?? 1)]);
   return ratios.reduce((best, [kind, ratio], part) => (kind > ratios[best][0] || (kind === ratios[best][0] && ratio > ratios[best][1]) ? part : best), 0);
 }
 
@@ -189,7 +109,7 @@ function spotWords(basis, vertex) {
 }
 
 /** Return the sentence on a state of the lungs as {before, told, after, error, meaning}; `told`, which the page
- * emphasises, is empty if the change is within its expected error. `target` is the result of targetOf, or null if the
+ * emphasises, is empty if the change is within its expected error. `target` is the one of targetsBetween, or null if the
  * sentence is about the surface, and `above` a phrase such as "500 mL above rest", or empty. */
 function sentenceOf(basis, moved, target, gravity, above) {
   const { name } = moved.from;
@@ -248,14 +168,15 @@ class Holds {
   /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from which
    * displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume at rest
    * has a normal distribution; the range is one standard deviation to either side. */
-  show({ lungNames, references, simulated, metadata }, held, depth, before, heights) {
+  show({ library, lungNames, references, metadata }, held, depth, before, heights) {
+    const simulated = library.tensor('simulated_range')?.data;
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
     this.rows.forEach(({ who, band, was, now, ml }, lung) => {
       const [from, to] = [before[lung], held[lung]];
       const above = (depth * to) / sumOf(held);
       const ends = [-1, 1].map((sign) => above + (to - above) * Math.exp(sign * Number(metadata.resting_spread)));
       const known = !metadata.resting_spread;
-      const most = references[lung] + Math.max(0, simulated?.range[2 * lung + 1] ?? 0);
+      const most = references[lung] + Math.max(0, simulated?.[2 * lung + 1] ?? 0);
       const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / most))}%`;
       who.textContent = `${lungNames[lung]}${apart ? ` (${heights[lung] > heights[1 - lung] ? 'up' : 'down'})` : ''}`;
       ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`}`;

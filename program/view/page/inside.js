@@ -5,42 +5,79 @@
 const BALL_RADIUS = 7; // radius of the ball drawn at a point, mm
 const DOT_RADIUS = 1.5; // radius of the balls drawn at the points of anatomy, mm
 
-/** Read the parts inside the lungs from the page. Sort points before meshes, so that each kind needs one draw call. */
-function takeInside(basis) {
-  const { inside, modes: k, placeUnit, middle } = basis;
+/** Read the parts inside the lungs from the page, and open them with the run-time library. */
+async function takeInside(basis, shared, options) {
+  const { inside, modes: k } = basis;
   const { vertices: n } = inside;
-  Object.assign(inside, { modes: k, order: basis.order });
-  const [places, fields, of, corners] = [takeRows('inside-vertices', n, 3, placeUnit, middle), takeRows('inside-coefficients', 3 * n, k, inside.unit),
-    takeTensor('inside-parts', Uint32Array), takeTriangles('inside-triangles', inside.triangles)];
+  inside.places = takePlaces('inside-vertices', n, basis.placeUnit, basis.middle);
+  inside.counts = takeCounts('inside-coefficients', 3 * n, k);
+  inside.of = takeTensor('inside-parts', Uint32Array);
+  const corners = takeTriangles('inside-triangles', inside.triangles);
+  const rigid = Uint32Array.from(inside.rigidRanges);
+  const tensors = {
+    vertices: [[n, 3], inside.places], triangles: [[inside.triangles, 3], corners], lung: [[n], lungsOfVertices(inside.lungBegin)],
+    coefficients: [[n, 3, k], coefficientsFrom(inside.counts, n, 3, k, inside.unit)],
+    part: [[n], inside.of], ...namesOf(inside), ...shared, ...takeSquares(basis, 'inside-'),
+    rigid: [[rigid.length / 2, 2], rigid.length ? rigid : undefined],
+  };
+  inside.library = await open(basisFile(tensors, metadataOf(basis, inside.metadata)), options);
+  sortInside(inside, corners);
+}
+
+/** Return the tensors with the names of the parts, and whether each is anatomy. */
+function namesOf({ names, anatomy }) {
+  const text = new TextEncoder().encode(names.join('\n'));
+  const large = Uint8Array.from(names, (_, part) => Number(anatomy.includes(part)));
+  return { names: [[text.length], text], anatomy: [[names.length], large] };
+}
+
+/** Return the vertices in the order in which they are drawn: points before meshes, and targets before anatomy, so that each
+ * kind needs one draw call. */
+function drawnOrder(inside, corners, isLarge) {
+  const { vertices: n, rigidRanges } = inside;
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
-  of.forEach((part, i) => { meshed[i] ||= Number(inside.rigid.includes(part)); }); // as in a mesh: sorting must not split a rigid part
+  for (let i = 0; i < rigidRanges.length; i += 2) meshed.fill(1, rigidRanges[i], rigidRanges[i + 1]); // sorting must not split a rigid part
+  const order = Uint32Array.from({ length: n }, (_, i) => i);
+  order.sort((a, b) => meshed[a] - meshed[b] || isLarge(a) - isLarge(b) || a - b);
+  inside.points = n - meshed.reduce((sum, x) => sum + x, 0);
+  inside.balls = order.subarray(0, inside.points).reduce((sum, vertex) => sum + 1 - isLarge(vertex), 0); // points of targets
+  return order;
+}
+
+/** Sort vertices and meshes for drawing. `order` has the library's index of each vertex drawn, `members` the vertices drawn
+ * of each part, and `rigid` the parts that keep their shape. */
+function sortInside(inside, corners) {
+  const { vertices: n, of, places } = inside;
   const large = new Set(inside.anatomy);
   const isLarge = (vertex) => Number(large.has(of[vertex]));
-  const order = Uint32Array.from({ length: n }, (_, i) => i).sort((a, b) => meshed[a] - meshed[b] || isLarge(a) - isLarge(b) || a - b);
+  const order = drawnOrder(inside, corners, isLarge);
   const rank = new Uint32Array(n);
   order.forEach((from, to) => { rank[from] = to; });
-  inside.points = meshed.indexOf(1) < 0 ? n : n - meshed.reduce((sum, x) => sum + x, 0);
-  inside.balls = order.subarray(0, inside.points).reduce((sum, vertex) => sum + 1 - isLarge(vertex), 0); // points of targets, which come first
+  inside.order = order;
   inside.reference = new Float32Array(4 * n); // reference position, mm, and lung
-  inside.fields = new Float32Array(3 * k * n);
   inside.part = new Float32Array(n);
   inside.members = inside.names.map(() => []); // vertices of each part
   order.forEach((from, to) => {
     inside.reference.set([...places.subarray(3 * from, 3 * from + 3), lungOf(inside, from)], 4 * to);
-    for (let first = 0; first < 3 * n; first += n) inside.fields.set(fields.subarray(k * (first + from), k * (first + from + 1)), k * (first + to));
     inside.part[to] = of[from];
     inside.members[of[from]].push(to);
   });
+  inside.rigid = inside.rigidRanges.filter((_, i) => i % 2 === 0).map((vertex) => of[vertex]);
   const meshOf = (part) => {
     const own = [];
-    for (let t = 0; t < corners.length; t += 3) if (part === null ? !isLarge(corners[t]) : of[corners[t]] === part) own.push(...corners.subarray(t, t + 3));
+    for (let t = 0; t < corners.length; t += 3) {
+      if (part === null ? !isLarge(corners[t]) : of[corners[t]] === part) own.push(...corners.subarray(t, t + 3));
+    }
     return own.map((corner) => rank[corner]);
   };
   const meshes = [null, ...inside.anatomy].map(meshOf); // of all targets, then of each structure that is anatomy
   inside.corners = Uint32Array.from(meshes.flat());
   inside.targetCorners = meshes[0].length;
-  inside.shells = inside.anatomy.map((part, i) => ({ part, colour: i % ANATOMY_COLOURS.length, begin: meshes.slice(0, i + 1).reduce((sum, { length }) => sum + length, 0), count: meshes[i + 1].length })).filter(({ count }) => count > 0);
+  const begin = (i) => meshes.slice(0, i + 1).reduce((sum, { length }) => sum + length, 0);
+  inside.shells = inside.anatomy.map((part, i) => (
+    { part, colour: i % ANATOMY_COLOURS.length, begin: begin(i), count: meshes[i + 1].length }));
+  inside.shells = inside.shells.filter(({ count }) => count > 0);
   inside.normals = normalsOf(inside);
 }
 
@@ -60,54 +97,14 @@ function normalsOf({ reference, vertices, corners }) {
   return normals;
 }
 
-/** Return the position, mm, of a vertex displaced by the modes, even if its part is rigid. */
-function fieldPlace(inside, moment, vertex) {
-  const { reference, fields, vertices, modes: k } = inside;
-  const lung = reference[4 * vertex + 3];
-  const weights = weightsOf(inside, moment, lung);
-  return [0, 1, 2].map((axis) => {
-    let sum = 0;
-    for (let m = 0, at = (axis * vertices + vertex) * k; m < k; ++m) sum += weights[m] * fields[at + m];
-    return reference[4 * vertex + axis] + moment.gains[3 * lung + axis] * sum;
-  });
+/** Return the position of a vertex drawn at a moment, mm. */
+function insidePlace({ library, order }, moment, vertex) {
+  const places = placesIn(library, moment);
+  return [...places.subarray(3 * order[vertex], 3 * order[vertex] + 3)];
 }
 
-/** Return the rows of the rotation that maps old to new positions of points with the least sum of squared distances.
- * `h` is the 3 x 3 sum of outer products of old and new positions, each relative to the mean position. The quaternion
- * of the rotation is the eigenvector of the largest eigenvalue of a symmetric matrix, found by power iteration as in
- * runtime/rigid.c. */
-function rotationOf(h) {
-  const m = [[h[0] + h[4] + h[8], h[5] - h[7], h[6] - h[2], h[1] - h[3]], [h[5] - h[7], h[0] - h[4] - h[8], h[1] + h[3], h[6] + h[2]],
-    [h[6] - h[2], h[1] + h[3], h[4] - h[0] - h[8], h[5] + h[7]], [h[1] - h[3], h[6] + h[2], h[5] + h[7], h[8] - h[0] - h[4]]];
-  const shift = Math.hypot(...m.flat());
-  let q = [1, 0.03, 0.02, 0.01];
-  for (let step = 0; step < 200 && shift > 0; ++step) {
-    const next = m.map((row, a) => shift * q[a] + row.reduce((sum, x, b) => sum + x * q[b], 0));
-    q = next.map((x) => x / Math.hypot(...next));
-  }
-  const [w, x, y, z] = q;
-  return [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
-}
-
-/** Return the positions of a part's vertices in the state `moment` of the lungs, mm. The modes displace each vertex. A
- * rigid part instead moves by the rotation and translation that fit these displacements best. */
-function insidePlaces(inside, moment, part) {
-  const members = inside.members[part];
-  const to = members.map((vertex) => fieldPlace(inside, moment, vertex));
-  if (!inside.rigid.includes(part)) return to;
-  const from = members.map((vertex) => [0, 1, 2].map((axis) => inside.reference[4 * vertex + axis]));
-  const [before, after] = [from, to].map((places) => [0, 1, 2].map((axis) => places.reduce((sum, p) => sum + p[axis], 0) / places.length));
-  const h = new Array(9).fill(0);
-  from.forEach((p, i) => { for (let k = 0; k < 9; ++k) h[k] += (p[Math.floor(k / 3)] - before[Math.floor(k / 3)]) * (to[i][k % 3] - after[k % 3]); });
-  const rotation = rotationOf(h);
-  return from.map((p) => rotation.map((row, axis) => after[axis] + row.reduce((sum, x, k) => sum + x * (p[k] - before[k]), 0)));
-}
-
-/** Return the position of a vertex of a rigid or deformable part, mm. */
-function insidePlace(inside, moment, vertex) {
-  return inside.rigid.includes(inside.part[vertex]) ? insidePlaces(inside, moment, inside.part[vertex])[vertex - inside.members[inside.part[vertex]][0]] : fieldPlace(inside, moment, vertex);
-}
+/** Return the positions of a part's vertices at a moment, mm. */
+const insidePlaces = (inside, moment, part) => inside.members[part].map((vertex) => insidePlace(inside, moment, vertex));
 
 /** Return the CSS colour of a part that is anatomy; undefined for a target. */
 const anatomyColour = ({ anatomy }, part) => (anatomy.includes(part) ? ANATOMY_COLOURS[anatomy.indexOf(part) % ANATOMY_COLOURS.length] : undefined);
@@ -186,7 +183,7 @@ class TargetTable {
   show(moved) {
     this.moved = moved;
     for (const { part, row, cells } of this.rows) {
-      const target = targetOf(this.inside, part, moved);
+      const target = moved.targets[part];
       const told = isTold(target);
       row.classList.toggle('untold', !told);
       const texts = [`${target.mm.toFixed(1)} mm`, moved.largest < 0.05 ? 'the reference' : told ? wayWords(target.move, 3, moved.now.gravity) : withinWords(target.error), target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`];

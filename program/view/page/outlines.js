@@ -92,7 +92,7 @@ class Outlines {
     return `${PLANES[axis].name}, ${Math.abs(at[axis] - (axis === 2 ? high : low)[axis]).toFixed(0)} mm from the ${PLANES[axis].from}`;
   }
 
-  /** Draw the outlines in the state `now`, and dashed outlines in the state `from`, through `target` (see targetOf) or,
+  /** Draw the outlines in the state `now`, and dashed outlines in the state `from`, through `target` (see targetsBetween) or,
    * if it is null, through the middle of a lung, unless the user has moved the planes. The target is drawn as a ball of
    * radius `radius`, mm, unless that is 0, and anatomy as contours. */
   show(now, from, target, radius) {

@@ -28,8 +28,8 @@ const rgb = (name) => {
   return [1, 3, 5].map((i) => parseInt(colourReader.fillStyle.slice(i, i + 2), 16) / 255);
 };
 
-function start() {
-  const basis = readBasis();
+async function start() {
+  const basis = await readBasis();
   const state = new State(basis);
   takeLink(location.hash, state);
   state.measure(); // the URL may have set a larger volume, which changes the ranges of the colour bar
@@ -38,7 +38,7 @@ function start() {
   const notes = new Notes($('notes'));
   const { inside } = basis;
   const fromWhere = () => state.from.name.replace(/^the /, 'in the '); // for example "in the scan"
-  const restOrScan = basis.resting ? 'rest' : 'the scan';
+  const restOrScan = basis.hasRest ? 'rest' : 'the scan';
   const redraw = () => { unseen = true; };
   const tangent = Math.tan(VIEW_ANGLE / 2);
   let stale = true;     // whether the vertices are out of date
@@ -239,12 +239,12 @@ function start() {
     notes.gravity(pane, x, y);
     notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
     if (inside && state.inside && state.moment && !state.turning) {
-      const terms = termsBetween(basis, state.moment, originMoment());
+      const between = targetsBetween(inside, state.moment, originMoment());
       const few = inside.names.length <= 6;
       for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
         if (!few && part !== state.chosen) break;
         if (!inside.members[part].length) continue;
-        const target = targetOf(inside, part, terms);
+        const target = between[part];
         const large = anatomyColour(inside, part);
         if (part === state.chosen && target.mm > 0.05 && !large) notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
         else {
@@ -313,7 +313,7 @@ function start() {
       told.chosen = next.chosen = state.chosen = firstTarget(inside, moved);
       table.press();
     }
-    const target = inside ? targetOf(inside, state.chosen, moved) : null;
+    const target = inside ? moved.targets[state.chosen] : null;
     const above = Math.round(moment.above) ? `${amount(Math.abs(moment.above))} ${moment.above < 0 ? 'below' : 'above'} ${restOrScan}` : '';
     const sentence = sentenceOf(basis, moved, target, state.gravity, above);
     writeSentence($('finding'), sentence);
@@ -328,7 +328,7 @@ function start() {
     for (const { posture, answer } of buttons) {
       const there = momentFor(basis, gravityOf(tilted(posture.q, posture.tilt)), depth);
       const far = there.folds ? null : movedBetween(basis, there, state.from);
-      answer.textContent = far ? answerOf(far, inside ? targetOf(inside, state.chosen, far) : null) : 'out of reach';
+      answer.textContent = far ? answerOf(far, inside ? far.targets[state.chosen] : null) : 'out of reach';
       answer.classList.toggle('told', !/error|reach|reference/.test(answer.textContent));
     }
     redraw();
@@ -338,7 +338,7 @@ function start() {
     $('holds-section').hidden = !moment.held;
     if (!moment.held) return;
     const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
-    holds.show(basis, moment.held, told.depth, heldBy(basis, from), lungHeights(state.gravity));
+    holds.show(basis, moment.held, told.depth, from.held, lungHeights(state.gravity));
     write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
     write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD between people.' : ''}${measured ? ` Published change: ${measured}.` : ''}`);
   }
@@ -439,7 +439,7 @@ function start() {
       }
       if (!good) {
         $('message').className = 'trouble plate';
-        $('message').textContent = `No breath of ${amount(state.depth)} in this posture: the surface would fold. Choose a smaller volume.`;
+        $('message').textContent = `No breath of ${amount(state.depth)} in this posture: ${state.trouble}.`;
       }
       deform();
     }
@@ -761,7 +761,7 @@ function start() {
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
   write('patient-fit', basis.metadata.patient ? `fitted to this patient: ${basis.metadata.patient}` : '');
-  write('state', basis.fields ? `another simulator\u2019s fields of gravity${basis.order > 0 ? ' and volume' : ''}, compressed: error ${errorOf(basis)}` : `at ${basis.resting ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  write('state', basis.fields ? `another simulator\u2019s fields of gravity${basis.order > 0 ? ' and volume' : ''}, compressed: error ${errorOf(basis)}` : `at ${basis.hasRest ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;
@@ -804,7 +804,7 @@ function start() {
     moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
     /** Do the CPU part of the work of one frame. */
     frameScript: () => { state.compute(); panes = makePanes(); onStage(drawNotes); showState(); },
-    sentenceOf, movedBetween, targetOf, armsOf, downOf, torsoRings, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
+    sentenceOf, movedBetween, armsOf, downOf, torsoRings, planesFor, linesAcross, placesOf, rangeEnd, tickStep, postureText, postureFrom, gravityOf, picturePng, basis, state, touch,
   };
 }
 
@@ -848,7 +848,7 @@ document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark
 try {
   if (!MeshoptDecoder.supported) throw new Error('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
   await MeshoptDecoder.ready;
-  window.supine = start();
+  window.supine = await start();
 } catch (error) {
   tell(error.message);
   throw error;

@@ -8,6 +8,7 @@ const source = (id) => document.getElementById(id).textContent;
 const NO_CUT = [0, 0, 0, 1e10];
 const ARROWS_SHOWN = 500;
 const CONTENT_COLOURS = 2 + ANATOMY_COLOURS.length; // of targets, of the chosen one, and of anatomy
+const FRAME_TEXELS = 6; // of the frame of a cluster (supine_gl_frames)
 const WIDTH = 2048; // width of the textures that hold lists, texels
 
 class Picture {
@@ -37,17 +38,18 @@ class Picture {
   }
 
   /** Return what capture() needs to deform vertices: the shader program, a texture of their coefficients, [axes, vertices,
-   * modes], which are multiples of `unit`, mm, and `array`, the vertex array. */
-  deformed(coefficients, vertices, axes, unit, array) {
+   * modes], as `counts` of steps of `unit`, mm, in rows padded to an even number, and `array`, the vertex array. */
+  deformed(counts, vertices, axes, unit, array) {
     const { gl, basis: { modes, lungs, order } } = this;
     const vectors = Math.ceil(modes / 4);
     const rows = axes * vertices;
     const height = Math.ceil((rows * vectors) / WIDTH) || 1;
-    const counts = new Int16Array(4 * WIDTH * height);
-    for (let i = 0; i < rows; ++i) for (let k = 0; k < modes; ++k) counts[4 * vectors * i + k] = Math.round(coefficients[modes * i + k] / unit);
+    const stride = counts.length / rows;
+    const texels = new Int16Array(4 * WIDTH * height);
+    for (let i = 0; i < rows; ++i) texels.set(counts.subarray(stride * i, stride * i + modes), 4 * vectors * i);
     const text = [`#define SUPINE_LUNGS ${lungs}`, `#define SUPINE_BY_LUNG ${order > 0 ? 1 : 0}`, `#define SUPINE_VECTORS ${vectors}`, `#define AXES ${axes}`, source('supine.glsl'), source('vertex.vert.glsl')];
     return { ...this.program('vertex.vert.glsl', null, ['moved'], text.join('\n')), array, count: vertices, vertices, every: 1, unit,
-      coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, counts) };
+      coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, texels) };
   }
 
   /** Return what capture() needs to deform the vertices of clusters: the shader program, the texture of the clusters'
@@ -56,7 +58,7 @@ class Picture {
     const { gl, basis } = this;
     const text = `${source('supine.glsl')}\n${source('cluster.vert.glsl')}`;
     return { ...this.program('cluster.vert.glsl', null, ['moved'], text), array, count: basis.vertices,
-      frames: this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, FRAME / 4, basis.clusters, null) };
+      frames: this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, FRAME_TEXELS, basis.clusters, null) };
   }
 
   program(vertex, fragment, outputs, text = source(vertex)) {
@@ -124,7 +126,7 @@ class Picture {
     };
     const inputs = (pick) => this.array([[this.buffer(pick(reference, 4)), 4, 16, 0], own(pick)]);
     const all = inputs((values) => values);
-    this.inputs = clusters > 0 ? this.clustered(all) : this.deformed(basis.coefficients, vertices, vector ? 3 : 1, basis.unit, all);
+    this.inputs = clusters > 0 ? this.clustered(all) : this.deformed(basis.counts, vertices, vector ? 3 : 1, basis.unit, all);
     this.fewInputs = { ...this.inputs, array: inputs(few), count: this.fewCount, every };
     this.makeFans();
   }
@@ -154,7 +156,14 @@ class Picture {
     const { gl, basis: { inside } } = this;
     this.content = this.program('content.vert.glsl', 'surface.frag.glsl');
     this.contentPicker = this.program('content.vert.glsl', 'content_pick.frag.glsl');
-    this.insideInputs = this.deformed(inside.fields, inside.vertices, 3, inside.unit, this.array([[this.buffer(inside.reference), 4, 16, 0]]));
+    const counts = inside.counts.slice(); // in the order of drawing
+    const stride = counts.length / (3 * inside.vertices);
+    inside.order.forEach((from, to) => {
+      for (let first = 0; first < 3 * inside.vertices; first += inside.vertices) {
+        counts.set(inside.counts.subarray(stride * (first + from), stride * (first + from + 1)), stride * (first + to));
+      }
+    });
+    this.insideInputs = this.deformed(counts, inside.vertices, 3, inside.unit, this.array([[this.buffer(inside.reference), 4, 16, 0]]));
     this.insideParts = this.buffer(inside.part);
     this.insideNormals = this.buffer(inside.normals);
     this.insideIndices = this.buffer(inside.corners, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
@@ -347,13 +356,10 @@ class Picture {
   }
 
   /** Set the uniforms and the texture of deformed() for the state `moment`. */
-  useModes(moment, { at, coefficients, vertices, every, unit }) {
-    const { gl, basis } = this;
-    const stride = 4 * Math.ceil(basis.modes / 4);
-    const weights = new Float32Array(stride * (basis.order > 0 ? basis.lungs : 1));
-    for (let lung = 0; lung * stride < weights.length; ++lung) weights.set(weightsOf(basis, moment, lung), lung * stride);
+  useModes({ weights, gains }, { at, coefficients, vertices, every, unit }) {
+    const { gl } = this;
     gl.uniform4fv(at.supine_weights, weights);
-    gl.uniform3fv(at.supine_gains, moment.gains);
+    gl.uniform3fv(at.supine_gains, gains);
     gl.uniform1i(at.vertices, vertices);
     gl.uniform1i(at.every, every);
     gl.uniform1f(at.unit, unit);
@@ -369,7 +375,7 @@ class Picture {
     gl.uniform1i(at.supine_frames, 2);
     gl.activeTexture(gl.TEXTURE2);
     gl.bindTexture(gl.TEXTURE_2D, frames);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, FRAME / 4, basis.clusters, gl.RGBA, gl.FLOAT, framesOf(basis, moment));
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, FRAME_TEXELS, basis.clusters, gl.RGBA, gl.FLOAT, moment.frames);
     gl.activeTexture(gl.TEXTURE0);
   }
 
@@ -402,7 +408,7 @@ class Picture {
    * depends on all the others: compute the vertices of these structures here, and overwrite those of the shader. */
   captureInside(moment, target) {
     const { gl, basis: { inside } } = this;
-    this.capture(moment, this.insideInputs, target);
+    this.capture(moment.within, this.insideInputs, target);
     gl.bindBuffer(gl.ARRAY_BUFFER, target);
     for (const part of inside.rigid) gl.bufferSubData(gl.ARRAY_BUFFER, 16 * inside.members[part][0], new Float32Array(insidePlaces(inside, moment, part).flatMap((p) => [...p, 1])));
     gl.bindBuffer(gl.ARRAY_BUFFER, null);

@@ -112,7 +112,9 @@ class State {
     const { basis } = this;
     this.tidal = basis.breathVolume;
     this.depthMin = 0;
-    this.tidalMax = this.depthMax = Math.max(2 * this.tidal, -restFor(basis, gravityOf(POSTURES[0].q)));
+    const held = basis.breathes ? momentFor(basis, gravityOf(POSTURES[0].q), 0).held ?? basis.references : [];
+    this.depthMax = Math.max(2 * this.tidal, sumOf(basis.references) - sumOf(held)); // full inflation, if it was scanned
+    this.tidalMax = this.depthMax;
     this.shared = [0, Infinity]; // volumes that are within reach in each of POSTURES
     if (basis.order > 0) {
       const ranges = POSTURES.map((p) => simulatedRange(basis, gravityOf(tilted(p.q, p.tilt))));
@@ -193,6 +195,7 @@ class State {
   compute() {
     if (!this.basis.breathes) this.depth = 0;
     const moment = momentFor(this.basis, this.gravity, this.depth);
+    this.trouble = moment.folds;
     if (moment.folds) return false;
     this.moment = moment;
     if (this.needsPinned) {

@@ -453,8 +453,9 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
  * @param weights  [4 ceil(mode_count / 4)], written; [lung_count, 4 ceil(mode_count / 4)] if
  *                 supine_basis_info.order is above 0, which needs SUPINE_BY_LUNG in supine.glsl
  * @param gains    [lung_count, 3], written
- * @retval SUPINE_ERROR_UNSUPPORTED  as supine_gl_pack; or supine_pose.expansion is not 0, which the
- *                                   shader lacks */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has clusters; or supine_pose.expansion is not 0, which
+ *                                   the shader lacks. Any number of modes is legal: a shader may
+ *                                   read coefficients from a texture */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 
