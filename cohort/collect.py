@@ -4,12 +4,14 @@
     python3 collect.py FIELDS.safetensors POINTS.csv PLAN.csv RUNS
 
 POINTS.csv has the positions x,y,z of the points, without a header; PLAN.csv the columns x, y and z of the directions of
-gravity; RUNS/0.csv, RUNS/1.csv, ... the displacements ux,uy,uz of all points in each row of the plan."""
+gravity, and fill; RUNS/NAME.csv the displacements ux,uy,uz of all points in the run of this name (plan.py)."""
 import array
 import csv
 import json
 import os
 import sys
+
+from plan import read_plan
 
 
 def numbers(path):
@@ -25,11 +27,11 @@ def numbers(path):
 
 def main():
     fields, points, plan, runs = sys.argv[1:]
-    with open(plan, encoding="utf-8", newline="") as file:
-        gravity = [[float(row[axis]) for axis in "xyz"] for row in csv.DictReader(file)]
+    states = read_plan(plan)
+    gravity = [list(map(float, state[:3])) for state in states.values()]
     positions, displacement = numbers(points), array.array("f")
-    for i in range(len(gravity)):
-        path = os.path.join(runs, f"{i}.csv")
+    for name in states:
+        path = os.path.join(runs, f"{name}.csv")
         run = numbers(path)
         if len(run) != len(positions):
             sys.exit(f"{path}: {len(run) // 3} displacements of {len(positions) // 3} points: compute this run again")

@@ -6,7 +6,7 @@
 #     snakemake -s cohort/simulations.smk --cores 2 --config plan=plan.csv points=points.csv inputs=lung.inp \
 #       simulate='python3 cohort/calculix.py lung.inp'
 #
-# Each row of plan.csv is a job. It runs the command `simulate` with five more words: x, y and z of the direction of
+# Each row of plan.csv is a job, named by its state: rows may be added, taken out and moved. It runs the command `simulate` with five more words: x, y and z of the direction of
 # gravity, the filling (0: the smallest volume, 1: the largest; 0 without a column fill), and the name of the CSV file
 # that it must write: ux,uy,uz of each point of points.csv, in its order and unit. A second run computes only the rows
 # that are new or have failed, and all of them if a file in `inputs` (separated by spaces) has changed. With --keep-going,
@@ -15,14 +15,16 @@
 # (minutes) of a job. On Slurm, whose accounting (slurmdbd) must run, replace --cores 2 by:
 #
 #     --slurm --jobs 40 --default-resources slurm_account=ACCOUNT slurm_partition=PARTITION
-import csv
+import sys
 
 here = workflow.basedir
+sys.path.insert(0, str(here))
+from plan import read_plan
+
 out = config.get("out", "fields.safetensors")
 runs = config.get("runs", "runs")
 
-with open(config["plan"], encoding="utf-8", newline="") as file:
-    rows = list(csv.DictReader(file))
+states = read_plan(config["plan"])
 
 
 rule all:
@@ -34,7 +36,7 @@ rule collect:
     input:
         points=config["points"],
         plan=config["plan"],
-        runs=expand(f"{runs}/{{run}}.csv", run=range(len(rows))),
+        runs=expand(f"{runs}/{{run}}.csv", run=states),
     output:
         out,
     params:
@@ -53,7 +55,7 @@ rule simulate:
         f"{runs}/{{run}}.csv",
     params:
         command=config["simulate"],
-        state=lambda wildcards: [rows[int(wildcards.run)].get(key) or "0" for key in ("x", "y", "z", "fill")],
+        state=lambda wildcards: states[wildcards.run],
     resources:
         mem_mb=config.get("mem_mb", 4000),
         runtime=config.get("runtime", 120),

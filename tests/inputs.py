@@ -242,6 +242,13 @@ CASES = {
     "fields-directions": (lambda: simulated(), lambda: simulated(directions=np.eye(3)), "refused"),
     "fields-gap": (lambda: simulated(), lambda: simulated(directions=even(40)[even(40)[:, 1] > 0.05]), "told"),
     "fields-positions": (lambda: simulated(), lambda: simulated(change=lambda u: u + solid), "refused"),
+    "fields-gravity": (lambda: simulated(), lambda: simulated(directions=np.where(np.arange(40) % 2, 1, 2)[:, None] * even(40)), "refused"),
+    "fields-repeated": (lambda: simulated(volumes=3), lambda: simulated(directions=np.concatenate([even(40), even(40)[:5]]), change=partly_reversed), "refused"),
+    "fields-copy": (lambda: simulated(), lambda: simulated(change=with_copy), "told"),
+    "fields-zero": (lambda: simulated(), lambda: simulated(change=lambda u: with_run(u, 0)), "told"),
+    "fields-node": (lambda: simulated(), lambda: simulated(change=with_node), "told"),
+    "fields-large": (lambda: simulated(), lambda: simulated(change=lambda u: (u - u.mean(0)) * 10), "told"),
+    "fields-frame": (lambda: simulated(), lambda: simulated(change=lambda u: u * [-1, -1, 1]), "told"),
     "fields-unit": (lambda: simulated(), lambda: simulated(change=lambda u: u / 1000), "told"),
     "fields-run-size": (lambda: simulated(), lambda: simulated(change=lambda u: with_run(u, 10)), "told"),
     "fields-run-error": (lambda: simulated(volumes=3), lambda: simulated(change=lambda u: with_run(u, -1)), "told"),
@@ -284,6 +291,24 @@ def simulated_volume(factor):
 def with_run(displacement, factor):
     """Scale one run."""
     displacement[7] *= factor
+    return displacement
+
+
+def with_copy(displacement):
+    """Let one run be a copy of another."""
+    displacement[7] = displacement[6]
+    return displacement
+
+
+def with_node(displacement):
+    """Displace one point of one run by 60 mm more."""
+    displacement[7, 11, 0] += 60
+    return displacement
+
+
+def partly_reversed(displacement):
+    """Reverse the last five runs."""
+    displacement[-5:] *= -1
     return displacement
 
 

@@ -14,6 +14,7 @@
  *              condition number is infinite, that of the half 3.7. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <supine/inputs.h>
 
@@ -21,6 +22,7 @@
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/fields/check.h"
+#include "precompute/fields/nodes.h"
 #include "precompute/fields/volumes.h"
 
 /* Directions in which the gap is looked for; they are 3 degrees apart. */
@@ -187,17 +189,11 @@ static void measure_along(const checking *c, supine_fields_motion *motion) {
   motion->along_mm = sum / (double)count;
 }
 
-/* Tell of displacements that are too small for lungs, and of a run that is much larger than all
- * others. A run that is smaller is right: it may be that of the reference posture. */
-static void check_sizes(const checking *c, const supine_fields_motion *motion) {
+/* Tell of a run that is much larger than all others. A run that is smaller is right: it may be that
+ * of the reference posture. */
+static void check_sizes(const checking *c) {
   size_t largest = 0;
   double second = 0.0;
-  if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, motion->rms_mm) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(c->findings,
-                        "%s: warning: the displacements are small, %s mm RMS: are they in "
-                        "metres? Write them in the unit of the points",
-                        c->name, supine_text_distance(motion->rms_mm).text);
-  }
   for (size_t run = 1; run < c->fields->run_count; ++run) {
     if (c->size[run] > c->size[largest]) {
       second = c->size[largest];
@@ -217,13 +213,50 @@ static void check_sizes(const checking *c, const supine_fields_motion *motion) {
   }
 }
 
+/* Tell of runs whose displacements are exactly those of an earlier run. */
+static void check_copies(const checking *c) {
+  const size_t row = 3 * c->fields->vertex_count;
+  for (size_t run = 1; run < c->fields->run_count; ++run) {
+    const double *u = c->fields->displacement + row * run;
+    size_t other = 0;
+    while (other < run &&
+           (c->size[run] != c->size[other] ||
+            memcmp(u, c->fields->displacement + row * other, row * sizeof *u) != 0)) {
+      ++other;
+    }
+    if (other < run &&
+        supine_input_judge(SUPINE_INPUT_FIELDS_COPY, c->size[run] > 0.0) != SUPINE_INPUT_TAKEN) {
+      supine_findings_add(c->findings,
+                          "%s: warning: rows %zu and %zu have exactly the same displacements: one "
+                          "of these runs may be a copy. Check both, or leave one out",
+                          c->name, other, run);
+    }
+  }
+}
+
+/* Tell of a vertex that moves unlike its neighbours. */
+static supine_status check_nodes(const checking *c, const supine_fields_motion *motion) {
+  supine_stray found;
+  SUPINE_TRY(supine_fields_find_stray(c->fields, c->lungs, motion->rms_mm, &found));
+  if (supine_input_judge(SUPINE_INPUT_FIELDS_NODE, found.ratio) != SUPINE_INPUT_TAKEN) {
+    const double *v = c->lungs->mesh.vertices + 3 * found.vertex;
+    supine_findings_add(c->findings,
+                        "%s: warning: row %zu: the point at %.1f,%.1f,%.1f mm (LPS) is displaced "
+                        "by %s mm more than its neighbours: check this node of the simulation",
+                        c->name, found.run, v[0], v[1], v[2],
+                        supine_text_distance(found.apart_mm).text);
+  }
+  return SUPINE_OK;
+}
+
 static supine_status check_all(checking *c, supine_fields_motion *motion) {
   measure_sizes(c, motion);
   measure_along(c, motion);
   SUPINE_TRY(check_directions(c));
   SUPINE_TRY(check_positions(c));
-  check_sizes(c, motion);
-  return SUPINE_OK;
+  check_sizes(c);
+  check_copies(c);
+  return check_nodes(c, motion);
 }
 
 supine_status supine_fields_check(const char *name, const supine_fields *fields,
@@ -261,18 +294,69 @@ static double left_out(const supine_fit_report *report) {
   return without > rounding ? least / without : 0.0;
 }
 
+/* Tell of runs that the others do not predict. */
+static void check_runs(const char *name, const supine_fit_report *report,
+                       supine_findings *findings) {
+  if (supine_input_judge(SUPINE_INPUT_FIELDS_ZERO, report->zero.ratio) != SUPINE_INPUT_TAKEN) {
+    supine_findings_add(findings,
+                        "%s: warning: row %zu: all displacements are 0, but the other rows predict "
+                        "%.0f %% of the RMS displacement: check whether this run has ended",
+                        name, report->zero.run, 100.0 * report->zero.part);
+  }
+  for (size_t i = 0; i < report->suspect_count; ++i) {
+    const supine_fit_suspect *suspect = &report->suspects[i];
+    if (supine_input_judge(SUPINE_INPUT_FIELDS_RUN_ERROR, suspect->ratio) != SUPINE_INPUT_TAKEN) {
+      supine_findings_add(findings,
+                          "%s: warning: row %zu: the other rows predict its displacement with %.0f "
+                          "times the usual error: check the direction and the displacement of this "
+                          "run",
+                          name, suspect->run, suspect->ratio);
+    }
+  }
+}
+
+/* Tell of displacements in another unit, and of gravity in other axes. */
+static void check_motion(const char *name, const supine_fit_frame *frame,
+                         supine_findings *findings) {
+  static const char *const axes[] = {"-z", "-y", "-x", "", "x", "y", "z"};
+  const supine_distance_text moved = supine_text_distance(frame->moved_mm);
+  if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, frame->moved_mm) != SUPINE_INPUT_TAKEN) {
+    supine_findings_add(findings,
+                        "%s: warning: gravity moves the lungs by %s mm RMS only: are the "
+                        "displacements in metres or centimetres? Write them in the unit of the "
+                        "points",
+                        name, moved.text);
+  }
+  if (supine_input_judge(SUPINE_INPUT_FIELDS_LARGE, frame->moved_mm) != SUPINE_INPUT_TAKEN) {
+    supine_findings_add(findings,
+                        "%s: warning: gravity moves the lungs by %s mm RMS, more than it moves "
+                        "those of people: check the unit of the displacements, and the stiffness "
+                        "and the density of the tissue",
+                        name, moved.text);
+  }
+  if (supine_input_judge(SUPINE_INPUT_FIELDS_FRAME, frame->gain) != SUPINE_INPUT_TAKEN) {
+    supine_findings_add(findings,
+                        "%s: warning: the lungs do not sag along gravity. Displacements along "
+                        "x, y and z follow %s, %s and %s of gravity: check that both have the axes "
+                        "of the surface, and that gravity points to where things fall",
+                        name, axes[frame->axis[0] + 3], axes[frame->axis[1] + 3],
+                        axes[frame->axis[2] + 3]);
+  }
+}
+
 supine_status supine_fields_check_fit(const char *name, const supine_fit_report *report,
                                       supine_findings *findings, supine_error *error) {
   const double part = left_out(report);
   const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_FIELDS_LEFT_OUT, part);
-  const bool bad_run =
-      supine_input_judge(SUPINE_INPUT_FIELDS_RUN_ERROR, report->worst_error) != SUPINE_INPUT_TAKEN;
   SUPINE_REFUSE_IF(
       verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_FORMAT,
       "%s: the directions of gravity do not predict the displacements: runs that are left out have "
-      "an error of %.0f %% of what gravity changes. Check that the rows of gravity and "
-      "displacement "
-      "are in the same order, or simulate more directions",
+      "an error of %.0f %% of what gravity changes. Check that each row of displacement is the run "
+      "of "
+      "its row of gravity: plans of version 0.2 and before were sorted, from +z to -z, and those "
+      "of "
+      "this version are not. Pair results of an old plan with the directions that they were run "
+      "with; or simulate more directions",
       name, 100.0 * part);
   if (verdict == SUPINE_INPUT_TOLD) {
     supine_findings_add(
@@ -282,12 +366,7 @@ supine_status supine_fields_check_fit(const char *name, const supine_fit_report 
         "and displacement are in the same order, or simulate more directions",
         name, 100.0 * part);
   }
-  if (bad_run) {
-    supine_findings_add(findings,
-                        "%s: warning: row %zu: the other rows predict its displacement with %.0f "
-                        "times the usual error: check the direction and the displacement of this "
-                        "run",
-                        name, report->worst_run, report->worst_error);
-  }
+  check_runs(name, report, findings);
+  check_motion(name, &report->frame, findings);
   return SUPINE_OK;
 }

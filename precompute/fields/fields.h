@@ -29,9 +29,11 @@ typedef struct supine_fields {
 
 /** Read displacement fields from a safetensors file with three tensors, F32 or F64: points [P, 3],
  * the positions of P points; gravity [M, 3], the directions of gravity of M runs; and displacement
- * [M, P, 3], the displacement of each point in each run. All are in the same axes and unit. Each
- * vertex of `lungs` takes the displacement of the point at its position, within 1e-4 of the
- * diagonal of the bounding box. Other points, such as inner nodes of a volume mesh, are left out.
+ * [M, P, 3], the displacement of each point in each run. A fourth tensor, run [M], has the number
+ * of the run of each row of displacement: it then belongs to the row of gravity whose fourth column
+ * is this number, or else to the row of this number. All are in the same axes and unit. Each vertex
+ * of `lungs` takes the displacement of the point at its position, within 1e-4 of the diagonal of
+ * the bounding box. Other points, such as inner nodes of a volume mesh, are left out.
  * @param lungs   the reference surface
  * @param frame   axes and unit of the file, which are those of the files of the lungs; a frame of
  *   zeros stands for LPS and mm
@@ -42,6 +44,22 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
 void supine_fields_free(supine_fields *fields);
 
 enum { SUPINE_FIT_BAND_MAX = 11, SUPINE_FIT_ORDER_MAX = 4 };
+
+enum { SUPINE_FIT_SUSPECTS_MAX = 3 };
+
+/** A run that the others predict badly (suspects.h). */
+typedef struct supine_fit_suspect {
+  size_t run;
+  double ratio; /**< RMS error / median error of the other runs, each predicted from the others */
+  double part;  /**< RMS error / RMS displacement of all runs */
+} supine_fit_suspect;
+
+/** How the displacements follow gravity (frame.h). */
+typedef struct supine_fit_frame {
+  double moved_mm; /**< RMS of what gravity changes: displacement minus its mean over directions */
+  double gain;     /**< motion along gravity that the turned axes gain / `moved_mm` */
+  int axis[3];     /**< these axes of gravity: 1, 2, 3 for x, y, z, negative if reversed */
+} supine_fit_frame;
 
 /** What a fit found. */
 typedef struct supine_fit_report {
@@ -55,10 +73,11 @@ typedef struct supine_fit_report {
   /** Relative RMS error of the smallest and the largest volumes of each direction, predicted from
    * the others: an extrapolation; 0 if the others do not determine the fit. */
   double extrapolated;
-  /** The run that its direction predicts worst, from runs of other directions; and its RMS error
-   * divided by the median of all runs, or 0 if it is below a tenth of the RMS displacement. */
-  size_t worst_run;
-  double worst_error;
+  supine_fit_suspect suspects[SUPINE_FIT_SUSPECTS_MAX]; /**< runs that the others do not predict */
+  size_t suspect_count;
+  supine_fit_suspect zero; /**< the run without displacement that the others predict worst; ratio 0
+                                if its prediction is below 0.3 of the RMS displacement */
+  supine_fit_frame frame;
 } supine_fit_report;
 
 /** A fit to fields. Zero-initialise; release with supine_fields_fit_free. */

@@ -8,6 +8,8 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
+#include "precompute/fields/frame.h"
+#include "precompute/fields/suspects.h"
 #include "precompute/fields/volumes.h"
 #include "precompute/projection/tally.h"
 
@@ -19,9 +21,6 @@ static const double exact = 1e-6;
 
 /* Relative error that is small beside that of any simulator. Modes are not kept to lower it. */
 static const double negligible = 1e-4;
-
-/* Error of a run, as a part of the RMS displacement of all runs, below which it is not named. */
-static const double worth_naming = 0.1;
 
 static double *lung_gram(const supine_fit *fit, size_t lung) {
   return fit->gram + lung * fit->fields->run_count * fit->fields->run_count;
@@ -78,42 +77,6 @@ static supine_status leave_out_all(const supine_fit *fit, const supine_regressio
   return SUPINE_OK;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  const double *a = left;
-  const double *b = right;
-  return (*a > *b) - (*a < *b);
-}
-
-/* Find the run that is predicted worst from the runs of other directions (supine_fit_report). */
-static supine_status find_worst_run(supine_fit *fit) {
-  const size_t m = fit->fields->run_count;
-  const supine_run_groups *groups = &fit->groups;
-  size_t worst = 0;
-  SUPINE_ARENA arena = {0};
-  double *residual = supine_arena_take(&arena, fit->chosen.part_count * m * m, sizeof *residual);
-  double *square = supine_arena_take(&arena, m, sizeof *square);
-  double *error = supine_arena_zeros(&arena, m, sizeof *error);
-  SUPINE_TRY(supine_arena_status(&arena));
-  for (size_t group = 0; group < fit->direction_groups; ++group) {
-    SUPINE_TRY(supine_fields_regression_predict(&fit->chosen, groups, group, fit->gram, 0, residual,
-                                                square));
-    for (size_t i = groups->begin[group]; i < groups->begin[group + 1]; ++i) {
-      error[groups->run[i]] =
-          sqrt(square[i - groups->begin[group]] / (double)fit->fields->vertex_count);
-    }
-  }
-  for (size_t run = 1; run < m; ++run) {
-    worst = error[run] > error[worst] ? run : worst;
-  }
-  const double largest = error[worst];
-  qsort(error, m, sizeof *error, compare_numbers);
-  fit->report.worst_run = worst;
-  if (largest > worth_naming * supine_fields_size(fit)) {
-    fit->report.worst_error = largest / error[m / 2];
-  }
-  return SUPINE_OK;
-}
-
 /* Fit up to a band and an order. Choose the fit if it is wanted or clearly better.
  * @param determined  written: whether the runs determine this fit
  * @param least       error of the chosen fit, updated */
@@ -162,6 +125,10 @@ static supine_status choose(supine_fit *fit, int wanted, supine_error *error) {
       highest = determined && band + 1 > highest ? band + 1 : highest;
     }
   }
+  SUPINE_REFUSE_IF(
+      fit->chosen.values == NULL && wanted < 0, error, SUPINE_ERROR_ARGUMENT,
+      "%zu runs for %zu directions of gravity determine no fit: simulate more directions",
+      fit->fields->run_count, fit->report.direction_count);
   SUPINE_REFUSE_ADVISE(
       fit->chosen.values == NULL, error, SUPINE_REMEDY_BAND_OUT, SUPINE_ERROR_ARGUMENT,
       "%zu directions of gravity do not determine band %d (%d harmonics); the highest band that "
@@ -174,7 +141,8 @@ static supine_status choose(supine_fit *fit, int wanted, supine_error *error) {
   if (fit->ends.count > 0 && supine_fields_regression_is_determined(&fit->chosen, &fit->ends)) {
     SUPINE_TRY(leave_out_all(fit, &fit->chosen, &fit->ends, &fit->report.extrapolated));
   }
-  return find_worst_run(fit);
+  SUPINE_TRY(supine_fields_find_suspects(fit, supine_fields_size(fit)));
+  return supine_fields_find_frame(fit);
 }
 
 supine_status supine_fields_fit(const supine_fields *fields, const supine_lungs *lungs, int band,

@@ -145,6 +145,48 @@ bool supine_fields_regression_is_determined(const supine_regression *regression,
   return true;
 }
 
+/* Subtract the product of values [runs, terms] and other [terms, runs] from a matrix [runs, runs].
+ */
+static void subtract_product(size_t runs, size_t terms, const double *values, const double *other,
+                             double *matrix) {
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)runs, (int)runs, (int)terms, -1.0,
+              values, (int)terms, other, (int)runs, 1.0, matrix, (int)runs);
+}
+
+supine_status supine_fields_regression_leave_each(const supine_regression *regression,
+                                                  const double *gram, double *square) {
+  const supine_regression *r = regression;
+  const size_t m = r->run_count;
+  SUPINE_ARENA arena = {0};
+  double *rest = supine_arena_take(&arena, m * m, sizeof *rest);       /* 1 - H */
+  double *product = supine_arena_take(&arena, m * m, sizeof *product); /* (1 - H) gram */
+  double *inner = supine_arena_take(&arena, r->terms * m, sizeof *inner);
+  SUPINE_TRY(supine_arena_status(&arena));
+  memset(square, 0, m * sizeof *square);
+  for (size_t part = 0; part < r->part_count; ++part) {
+    const double *values = r->values + part * m * r->terms;
+    const double *pinv = r->pinv + part * m * r->terms;
+    memset(rest, 0, m * m * sizeof *rest);
+    memcpy(product, gram + part * m * m, m * m * sizeof *product);
+    for (size_t i = 0; i < m; ++i) {
+      rest[i * m + i] = 1.0;
+    }
+    subtract_product(m, r->terms, values, pinv, rest);
+    cblas_dsymm(CblasRowMajor, CblasRight, CblasUpper, (int)r->terms, (int)m, 1.0,
+                gram + part * m * m, (int)m, pinv, (int)m, 0.0, inner, (int)m);
+    subtract_product(m, r->terms, values, inner, product);
+    for (size_t i = 0; i < m; ++i) { /* (1) for a group of one run */
+      const double free = rest[i * m + i];
+      if (free < free_min) {
+        return SUPINE_ERROR_NUMERICAL;
+      }
+      const double sum = cblas_ddot((int)m, product + i * m, 1, rest + i * m, 1);
+      square[i] += fmax(sum, 0.0) / (free * free);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Compute the pseudo-inverse without the runs of a group, pinv [terms, runs], by (1). */
 static supine_status invert_without(const left_out *s, double *pinv) {
   const supine_regression *r = s->r;

@@ -57,6 +57,12 @@ supine_status supine_fields_regression_create(const supine_runs *runs, size_t ba
 bool supine_fields_regression_is_determined(const supine_regression *regression,
                                             const supine_run_groups *groups);
 
+/** Predict each run from all others, and compute the squared errors.
+ * @param square  [run_count] written: squared error of each run, mm^2, of all parts
+ * @retval SUPINE_ERROR_NUMERICAL  a run has no residual whatever its displacements */
+supine_status supine_fields_regression_leave_each(const supine_regression *regression,
+                                                  const double *gram, double *square);
+
 /** Predict the runs of a group from all other runs, in every part, and compute the squared errors.
  * @param gram      [part_count, run_count, run_count] scalar products of the displacements of any
  *   two runs in each part, mm^2

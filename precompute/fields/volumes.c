@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdint.h>
 
+#include <supine/inputs.h>
+
 #include "base/vec3.h"
 #include "precompute/fields/volumes.h"
 
@@ -73,6 +75,36 @@ static supine_status rank_run(const supine_fit *fit, const size_t *direction, si
     *rank += apart < 0.0;
     ++*count;
   }
+  return SUPINE_OK;
+}
+
+/* Refuse runs of which only some directions are given again. */
+static supine_status check_repeated(const supine_fit *fit, const size_t *direction,
+                                    supine_error *error) {
+  const size_t m = fit->fields->run_count;
+  size_t single = 0;
+  size_t again = 0; /* last run whose direction was given before */
+  size_t before = 0;
+  for (size_t run = 0; run < m; ++run) {
+    size_t count = 0;
+    for (size_t other = 0; other < m; ++other) {
+      count += direction[other] == direction[run];
+      if (other < run && direction[other] == direction[run]) {
+        again = run;
+        before = other;
+      }
+    }
+    single += count == 1;
+  }
+  const double share = (double)single / (double)fit->report.direction_count;
+  const supine_input_verdict verdict =
+      again > 0 ? supine_input_judge(SUPINE_INPUT_FIELDS_REPEATED, share) : SUPINE_INPUT_TAKEN;
+  SUPINE_REFUSE_IF(
+      verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_FORMAT,
+      "rows %zu and %zu have the same direction of gravity and other displacements, but "
+      "%zu of %zu directions are given once: keep one run for each direction, or "
+      "simulate all directions at several volumes",
+      before, again, single, fit->report.direction_count);
   return SUPINE_OK;
 }
 
@@ -151,6 +183,7 @@ supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error
   SUPINE_REFUSE_IF(fit->report.direction_count < m && !closed, error, SUPINE_ERROR_OPEN_SURFACE,
                    "two runs have the same direction of gravity, but the surface is open, so that "
                    "their volumes are unknown: close it, or keep one run for each direction");
+  SUPINE_TRY(check_repeated(fit, direction, error));
   size_t levels = 1;
   if (closed) {
     for (size_t run = 0; run < m; ++run) {

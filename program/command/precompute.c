@@ -71,7 +71,9 @@ static const supine_option table[] = {
     {"fields", 0, "FILE",
      "safetensors file with three tensors: points [P,3], the positions of P points; gravity [M,3], "
      "the directions of M runs; and displacement [M,P,3], the displacement of each point in each "
-     "run. All three are in the axes and unit of MESH. Each vertex of MESH takes the displacement "
+     "run. With a fourth tensor, run [M], each row of displacement belongs to the row of gravity "
+     "with this number, or whose fourth column is this number. All are in the axes and unit of "
+     "MESH. Each vertex of MESH takes the displacement "
      "of the point at its position, so that the points may have any order and may include inner "
      "nodes of a volume mesh.\nRuns of one direction at several volumes: the basis has gravity and "
      "volume, and takes any volume between the smallest and the largest that were simulated. One "
@@ -93,12 +95,13 @@ static const supine_option table[] = {
                  "surfaces-out scanned resting full",
      .more = true},
     {"directions", 0, "N",
-     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate",
+     "only print N directions of gravity that cover the sphere evenly, as CSV, to simulate. Their "
+     "order is shuffled, so that results in another order are noticed",
      FILLS(directions), .range = {2.0, 1000.0}, .partners = "volumes", .alone = true},
     {"volumes", 0, "N",
      "with --directions: print N rows for each direction, with a column 'fill' from 0, the "
-     "smallest "
-     "volume to simulate, to 1, the largest. Four are enough for most tissue",
+     "smallest volume to simulate, to 1, the largest, and a column 'run', the number of the row. "
+     "Six suit most tissue",
      FILLS(volumes), .range = {2.0, 100.0}, .partners = "directions"},
     {.table = supine_options_model, FILLS(model)},
     {.name = NULL}};
@@ -222,22 +225,40 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
   }
 }
 
-/* Print a plan of simulations: directions of gravity and, if `volumes` is not 0, parts of the way
- * from the smallest to the largest volume. */
-static void print_plan(size_t directions, size_t volumes) {
-  (void)puts(volumes > 0 ? "x,y,z,fill" : "x,y,z");
-  for (size_t i = 0; i < directions; ++i) {
-    double g[3];
-    supine_spiral((double)i, (double)directions, 0.0, g);
-    for (size_t v = 0; v < (volumes > 0 ? volumes : 1); ++v) {
-      supine_csv_row row = {.file = stdout};
-      supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
-      if (volumes > 0) {
-        supine_csv_add(&row, "%.9g", (double)v / (double)(volumes - 1));
-      }
-      supine_csv_end_row(&row);
-    }
+/* Shuffle the numbers 0 to count - 1, always in the same way (Fisher and Yates). In a sorted plan,
+ * results that are shifted by some rows are turned by almost the same rotation in each row, which
+ * looks like another tissue. */
+static void shuffle(size_t count, size_t *order) {
+  uint64_t state = 1;
+  for (size_t i = 0; i < count; ++i) {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    const size_t at = (size_t)((state >> 33) % (i + 1));
+    order[i] = order[at];
+    order[at] = i;
   }
+}
+
+/* Print a plan of simulations: directions of gravity and, if `volumes` is not 0, parts of the way
+ * from the smallest to the largest volume, and the number of the run. */
+static supine_status print_plan(size_t directions, size_t volumes, supine_error *error) {
+  const size_t each = volumes > 0 ? volumes : 1;
+  SUPINE_ARENA arena = {0};
+  size_t *order = supine_arena_take(&arena, directions * each, sizeof *order);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu runs", directions * each));
+  shuffle(directions * each, order);
+  (void)puts(volumes > 0 ? "x,y,z,fill,run" : "x,y,z");
+  for (size_t run = 0; run < directions * each; ++run) {
+    double g[3];
+    supine_csv_row row = {.file = stdout};
+    supine_spiral((double)(order[run] / each), (double)directions, 0.0, g);
+    supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+    if (volumes > 0) {
+      supine_csv_add(&row, "%.9g", (double)(order[run] % each) / (double)(volumes - 1));
+      supine_csv_add(&row, "%zu", run);
+    }
+    supine_csv_end_row(&row);
+  }
+  return SUPINE_OK;
 }
 
 static int show_progress(void *progress, double fraction) {
@@ -270,8 +291,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_precompute_report report;
   SUPINE_FREED_BY(supine_precompute_prepared_free) supine_prepared prepared = {.fit = ""};
   if (wanted->directions > 0) {
-    print_plan(wanted->directions, wanted->volumes);
-    return SUPINE_OK;
+    return print_plan(wanted->directions, wanted->volumes, error);
   }
   SUPINE_REFUSE_IF(supine_mesh_save_supports(wanted->path), error, SUPINE_ERROR_ARGUMENT,
                    "%s: this is the name of a mesh: give a name that ends in .safetensors",

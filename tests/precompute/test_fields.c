@@ -488,7 +488,7 @@ TEST(test_fields_check_positions_metres_and_single_runs_refused_or_told) {
   for (size_t i = 0; i < 3 * n * EVEN; ++i) {
     fields.displacement[i] *= 1e-3;
   }
-  expect_verdict(&fields, false, "are they in metres?");
+  expect_verdict(&fields, false, "in metres or centimetres?");
   supine_fields_free(&fields);
   fields = sagging(even, EVEN, 1);
   scale_run(&fields, 7, 10.0);
@@ -497,6 +497,102 @@ TEST(test_fields_check_positions_metres_and_single_runs_refused_or_told) {
   fields = sagging(even, EVEN, 1);
   scale_run(&fields, 11, -1.0);
   expect_verdict(&fields, false, "row 11: the other rows predict");
+  supine_fields_free(&fields);
+}
+
+static double *run_of(supine_fields *fields, size_t run) {
+  return fields->displacement + 3 * fields->vertex_count * run;
+}
+
+TEST(test_fields_check_zeros_copies_exchanged_runs_and_stray_nodes_told) {
+  double even[3 * EVEN];
+  spread_evenly(even);
+  for (size_t volumes = 1; volumes <= 3; volumes += 2) {
+    supine_fields fields = sagging(even, EVEN, volumes);
+    const size_t row = 3 * fields.vertex_count;
+    scale_run(&fields, 21, 0.0);
+    expect_verdict(&fields, false, "row 21: all displacements are 0");
+    supine_fields_free(&fields);
+    fields = sagging(even, EVEN, volumes);
+    memcpy(run_of(&fields, 21), run_of(&fields, 9), row * sizeof(double));
+    expect_verdict(&fields, false, "rows 9 and 21 have exactly the same displacements");
+    supine_fields_free(&fields);
+    fields = sagging(even, EVEN, volumes);
+    for (size_t i = 0; i < row; ++i) {
+      const double kept = run_of(&fields, 9)[i];
+      run_of(&fields, 9)[i] = run_of(&fields, 27)[i];
+      run_of(&fields, 27)[i] = kept;
+    }
+    expect_verdict(&fields, false, "row 9: the other rows predict");
+    expect_verdict(&fields, false, "row 27: the other rows predict");
+    supine_fields_free(&fields);
+    fields = sagging(even, EVEN, volumes);
+    run_of(&fields, 14)[3 * 77] += 60.0;
+    expect_verdict(&fields, false, "row 14: the point at");
+    supine_fields_free(&fields);
+  }
+}
+
+/* Displacements that count from a run: this run is 0, as the others predict. */
+TEST(test_fields_check_zeros_of_the_reference_posture_taken) {
+  double even[3 * EVEN];
+  spread_evenly(even);
+  supine_fields fields = sagging(even, EVEN, 1);
+  for (size_t run = EVEN; run-- > 0;) {
+    for (size_t i = 0; i < 3 * fields.vertex_count; ++i) {
+      run_of(&fields, run)[i] -= run_of(&fields, 0)[i];
+    }
+  }
+  for (size_t run = 1; run < EVEN; ++run) { /* from run 0, which was subtracted last, from itself */
+    assert_true(run_of(&fields, run)[0] != 0.0);
+  }
+  expect_verdict(&fields, false, "");
+  supine_fields_free(&fields);
+}
+
+TEST(test_fields_check_other_axes_and_units_told) {
+  static const struct {
+    int axis[3];
+    const char *words;
+  } known[] = {{{-1, -2, -3}, "follow -x, -y and -z of gravity"},
+               {{-1, -2, 3}, "follow -x, -y and z of gravity"},
+               {{1, 3, 2}, "follow x, z and y of gravity"}};
+  double even[3 * EVEN];
+  spread_evenly(even);
+  for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
+    supine_fields fields = sagging(even, EVEN, 1);
+    for (size_t run = 0; run < EVEN; ++run) {
+      for (size_t k = 0; k < 3; ++k) {
+        const int axis = known[i].axis[k];
+        const double g = even[3 * run + (size_t)abs(axis) - 1];
+        fields.directions[3 * run + k] = axis < 0 ? -g : g;
+      }
+    }
+    expect_verdict(&fields, false, known[i].words);
+    supine_fields_free(&fields);
+  }
+  for (size_t tenfold = 0; tenfold <= 1; ++tenfold) {
+    supine_fields fields = sagging(even, EVEN, 1);
+    const double factor = tenfold != 0 ? 10.0 : 0.1;
+    for (size_t i = 0; i < 3 * EVEN * fields.vertex_count; ++i) {
+      const double common = 0.04 * (lungs.mesh.vertices[i % (3 * fields.vertex_count)] -
+                                    0.5 * (lungs.minimum[i % 3] + lungs.maximum[i % 3]));
+      fields.displacement[i] = factor * (fields.displacement[i] - common);
+    }
+    expect_verdict(&fields, false, tenfold != 0 ? "more than it moves" : "metres or centimetres");
+    supine_fields_free(&fields);
+  }
+}
+
+TEST(test_fields_check_some_directions_again_refused) {
+  double even[3 * (EVEN + 5)];
+  spread_evenly(even);
+  memcpy(even + 3 * EVEN, even, 15 * sizeof *even);
+  supine_fields fields = sagging(even, EVEN + 5, 1);
+  for (size_t run = EVEN; run < EVEN + 5; ++run) {
+    scale_run(&fields, run, -1.0);
+  }
+  expect_verdict(&fields, true, "35 of 40 directions are given once");
   supine_fields_free(&fields);
 }
 
@@ -603,6 +699,28 @@ TEST(test_fields_load_any_order_axes_and_inner_points_each_vertex_its_own) {
   assert_close(fields.directions[4], 1.0, 1e-15);
   supine_fields_free(&fields);
   free_tensors(tensors);
+}
+
+TEST(test_fields_load_runs_by_number_any_order_matched) {
+  static const double ids[] = {31.0, 30.0};
+  supine_tensor tensors[4];
+  supine_fields fields = {0};
+  const char *path = in_folder("fields.safetensors");
+  write_fields(path, 2, two_directions, tensors);
+  const double *g = tensors[1].data;
+  const double numbered[8] = {g[3], g[4], g[5], 31.0, g[0], g[1], g[2], 30.0};
+  free((void *)tensors[1].data);
+  tensors[1].data = numbered;
+  tensors[1].shape[1] = 4;
+  tensors[3] = (supine_tensor){"run", SUPINE_F64, 1, {2}, ids};
+  assert_int_equal(supine_safetensors_write(path, tensors, 4, NULL, 0, NULL), SUPINE_OK);
+  assert_int_equal(supine_fields_load(path, &lungs, &ras_cm, &fields, NULL), SUPINE_OK);
+  assert_close(fields.directions[1], 1.0, 1e-15);
+  assert_close(fields.directions[5], -0.8, 1e-15);
+  supine_fields_free(&fields);
+  tensors[1].data = NULL;
+  free((void *)tensors[0].data);
+  free((void *)tensors[2].data);
 }
 
 /* An array of another type beside the three, such as the numbers of the nodes, is ignored. */
@@ -810,6 +928,8 @@ TEST(test_fields_file_of_another_program_named) {
 
 TEST(test_directions_printed_evenly_spread) {
   double g[3] = {0.0};
+  EXPECT(0, "x,y,z,fill,run\n", "precompute --directions 4 --volumes 3");
+  EXPECT(0, ",11\n", "precompute --directions 4 --volumes 3");
   EXPECT(0, "x,y,z\n", "precompute --directions 32");
   char *at = printed + 6;
   for (int count = 0; count < 32; ++count) {

@@ -42,18 +42,23 @@ if command -v snakemake >/dev/null; then
   grep -q '^simulate *12' said || fail "simulations were computed again: $(grep -A6 '^job' said)"
 else
   touch ready
-  i=0
-  tail -n +2 plan.csv | tr , ' ' | tr -d '\r' >states
-  while read -r x y z fill; do
-    sh simulate.sh "$x" "$y" "$z" "$fill" "runs/$i.csv" || fail "row $i"
-    i=$((i + 1))
+  python3 "$cohort/plan.py" plan.csv >states || fail "no states"
+  while read -r run x y z fill; do
+    sh simulate.sh "$x" "$y" "$z" "$fill" "runs/$run.csv" || fail "run $run"
   done <states
   python3 "$cohort/collect.py" fields.safetensors points.csv plan.csv runs || fail "no fields"
 fi
 "$supine" precompute lungs.obj --fields fields.safetensors -o lungs.safetensors >said 2>&1 || fail "$(cat said)"
 grep -q 'fields of gravity and volume: .* 12 directions, 3 volumes each' said || fail "another plan: $(head -1 said)"
+# a row taken out, and the others in another order: each direction keeps its run
+sed '5d' plan.csv >fewer.csv
+{ head -1 fewer.csv; tail -n +2 fewer.csv | sort; } >sorted.csv
+python3 "$cohort/collect.py" some.safetensors points.csv sorted.csv runs || fail "no fields of fewer rows"
+"$supine" precompute lungs.obj --fields some.safetensors -o lungs.safetensors >said 2>&1 || fail "$(cat said)"
+grep -q warning said && fail "$(cat said)"
+first=$(python3 "$cohort/plan.py" plan.csv | sed -n '4s/ .*//p')
 rm -f fields.safetensors
-echo 1,2 >runs/3.csv
+echo 1,2 >"runs/$first.csv"
 python3 "$cohort/collect.py" fields.safetensors points.csv plan.csv runs 2>said && fail "a corrupt run was collected"
-grep -q 'runs/3.csv: line 1 has 2 numbers' said || fail "$(cat said)"
+grep -q "runs/$first.csv: line 1 has 2 numbers" said || fail "$(cat said)"
 [ ! -e fields.safetensors ] || fail "a file of corrupt runs"

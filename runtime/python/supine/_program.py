@@ -95,19 +95,27 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
 
 
 def save_fields(path: Union[str, "os.PathLike[str]"], points: ArrayLike, gravity: ArrayLike,
-                displacement: ArrayLike) -> None:
+                displacement: ArrayLike, run: Optional[ArrayLike] = None) -> None:
     """Write another simulator's displacement fields as a safetensors file for `supine precompute --fields`.
 
     points: [P, 3], positions of the points before they move, such as the nodes of a volume mesh; each vertex of the
         surface must be among them
-    gravity: [M, 3], direction of gravity of each simulation
+    gravity: [M, 3], direction of gravity of each simulation; or [R, 4], with the number of its run
     displacement: [M, P, 3], displacement of each point in each simulation
+    run: [M], number of the run of each row of displacement, which may then have any order: a row belongs to the row of
+        gravity with this run or, if gravity is [R, 3], to the row of this number
     All in the axes and unit of the file of the surface. Numbers are stored as float32."""
     arrays = {"points": np.asarray(points, "<f4"), "gravity": np.asarray(gravity, "<f4"),
               "displacement": np.asarray(displacement, "<f4")}
     shapes = [array.shape for array in arrays.values()]
-    if shapes[1:] != [shapes[2][:1] + (3,), shapes[2][:1] + shapes[0]] or shapes[0][1:] != (3,):
+    rows = shapes[2][:1] if run is None else shapes[1][:1]
+    if (shapes[1] not in (rows + (3,), rows + (4,)) or shapes[2] != shapes[2][:1] + shapes[0]
+            or shapes[0][1:] != (3,)):
         raise ValueError(f"expected points [P, 3], gravity [M, 3] and displacement [M, P, 3], not {shapes}")
+    if run is not None:
+        arrays["run"] = np.asarray(run, "<f4")
+        if arrays["run"].shape != shapes[2][:1]:
+            raise ValueError(f"expected the run of each row of displacement, {list(shapes[2][:1])}, not {list(arrays['run'].shape)}")
     header, end = {}, 0
     for name, array in arrays.items():
         header[name] = {"dtype": "F32", "shape": array.shape, "data_offsets": [end, end + array.nbytes]}
