@@ -5,12 +5,29 @@
 
 #include "program/options/option.h"
 
-extern const supine_command supine_command_phantom, supine_command_precompute, supine_command_info,
-    supine_command_deform, supine_command_compare, supine_command_render, supine_command_breathe,
-    supine_command_export, supine_command_solve, supine_command_pv, supine_command_stream,
-    supine_command_fit, supine_command_validate, supine_command_embed, supine_command_locate;
+/* The commands, in the order of the program's help. Each is supine_command_NAME in NAME.c. */
+#define SUPINE_COMMANDS(COMMAND)                                                                   \
+  COMMAND(phantom)                                                                                 \
+  COMMAND(precompute)                                                                              \
+  COMMAND(fit)                                                                                     \
+  COMMAND(validate)                                                                                \
+  COMMAND(embed)                                                                                   \
+  COMMAND(locate)                                                                                  \
+  COMMAND(info)                                                                                    \
+  COMMAND(deform)                                                                                  \
+  COMMAND(compare)                                                                                 \
+  COMMAND(render)                                                                                  \
+  COMMAND(breathe)                                                                                 \
+  COMMAND(export)                                                                                  \
+  COMMAND(solve)                                                                                   \
+  COMMAND(pv)                                                                                      \
+  COMMAND(stream)
 
-/* All commands, in the order of the program's help, ended by NULL. */
+#define SUPINE_COMMAND_DECLARE(name) extern const supine_command supine_command_##name;
+SUPINE_COMMANDS(SUPINE_COMMAND_DECLARE)
+#undef SUPINE_COMMAND_DECLARE
+
+/* All commands, in this order, ended by NULL. */
 extern const supine_command *const supine_command_list[];
 
 #endif
