@@ -24,12 +24,27 @@ typedef struct knowledge {
   supine_person person;
 } knowledge;
 
+/* The laws of the public header follow its DEFAULT, in the order of those here. */
+#define SAME_LAW(id, ...)                                                                          \
+  _Static_assert((int)SUPINE_PRECOMPUTE_LAW_##id == (int)SUPINE_LAW_##id + 1,                      \
+                 "supine_precompute_law_kind lists the laws in the order of SUPINE_LAWS");
+SUPINE_LAWS(SAME_LAW)
+_Static_assert((int)SUPINE_PRECOMPUTE_LAW_COUNT == (int)SUPINE_LAW_COUNT + 1, "as many laws");
+
+supine_precompute_law_kind supine_precompute_law_of(supine_law law) {
+  return (supine_precompute_law_kind)((int)law + 1);
+}
+
 /* Select the displacement law. Constants that the user gives override its constants. */
-static supine_model choose_law(const supine_precompute_options *options) {
+static supine_status choose_law(const supine_precompute_options *options, supine_model *chosen,
+                                supine_error *error) {
   const supine_precompute_law *given = &options->law;
   supine_law law = SUPINE_LAW_DEEP;
+  SUPINE_REFUSE_IF((int)given->kind < 0 || given->kind >= SUPINE_PRECOMPUTE_LAW_COUNT, error,
+                   SUPINE_ERROR_ARGUMENT, "law %d: give a supine_precompute_law_kind",
+                   (int)given->kind);
   if (given->kind != SUPINE_PRECOMPUTE_LAW_DEFAULT) {
-    law = given->kind == SUPINE_PRECOMPUTE_LAW_PAPER ? SUPINE_LAW_PAPER : SUPINE_LAW_DEEP;
+    law = (supine_law)((int)given->kind - 1);
   } else if (options->scan.shown == SUPINE_SHOWN_UNKNOWN || options->fields != NULL) {
     law = SUPINE_LAW_PAPER;
   }
@@ -55,7 +70,8 @@ static supine_model choose_law(const supine_precompute_options *options) {
   if (given->has_constants || c[0] != 0.0 || c[2] != 0.0 || c[4] != 0.0) {
     memcpy(model.direction.c, c, sizeof model.direction.c);
   }
-  return model;
+  *chosen = model;
+  return SUPINE_OK;
 }
 
 /* Say what volume the law gives the lungs in the state that was not scanned. */
@@ -142,8 +158,8 @@ static supine_status choose_model(const supine_precompute_options *options,
     }
     return SUPINE_OK;
   }
-  p->model = choose_law(options);
-  if (!known->has_scan && p->model.law != SUPINE_LAW_PAPER) {
+  SUPINE_TRY(choose_law(options, &p->model, error));
+  if (!known->has_scan && !p->model.from_scan) {
     (void)supine_physics_reference_scan_parse("full", &known->scan, NULL);
   }
   return SUPINE_OK;
@@ -350,12 +366,13 @@ static void summarize_fields(supine_prepared *p) {
 
 /* Add the volume at full inflation to the state of the scan, and check that the law and this volume
  * go with it. */
-static supine_status complete_scan(const supine_precompute_volumes *volumes, supine_law law,
-                                   supine_scan *scan, supine_error *error) {
+static supine_status complete_scan(const supine_precompute_volumes *volumes,
+                                   const supine_model *model, supine_scan *scan,
+                                   supine_error *error) {
   SUPINE_REFUSE_ADVISE(
-      law == SUPINE_LAW_PAPER && scan->known, error, SUPINE_REMEDY_LAW_OR_SCAN,
-      SUPINE_ERROR_ARGUMENT,
-      "the law 'paper' takes the scan as the reference, but the state of the scan was given");
+      model->from_scan && scan->known, error, SUPINE_REMEDY_LAW_OR_SCAN, SUPINE_ERROR_ARGUMENT,
+      "the law '%s' takes the scan as the reference, but the state of the scan was given",
+      supine_physics_law_names[model->law]);
   const supine_volume_kind kind = scan->state.volume.kind;
   SUPINE_REFUSE_IF(scan->known && kind == SUPINE_VOLUME_DEFAULT, error, SUPINE_ERROR_ARGUMENT,
                    "the state of the scan is a posture alone, which is only for another "
@@ -467,7 +484,7 @@ static supine_status set_model(const supine_precompute_options *options,
   if (options->fields != NULL) {
     SUPINE_TRY(name_volumes(options, &known->resting, p, error));
   } else {
-    SUPINE_TRY(complete_scan(&options->volumes, p->model.law, &known->scan, error));
+    SUPINE_TRY(complete_scan(&options->volumes, &p->model, &known->scan, error));
   }
   SUPINE_TRY(set_expandability(&options->tissue, p, error));
   SUPINE_TRY(set_lesions(&options->tissue, p, error));

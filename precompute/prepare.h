@@ -31,6 +31,9 @@ typedef struct supine_prepared {
   supine_arena memory; /**< of the arrays of the model */
 } supine_prepared;
 
+/** Return a law as the public header names it. */
+supine_precompute_law_kind supine_precompute_law_of(supine_law law);
+
 /** Load lungs from files, select the displacement law, set stiffness and lesions, and move the
  * vertices of the scan to the reference surface.
  * @param prepared  zeroed; release with supine_precompute_prepared_free, also after an error */

@@ -8,9 +8,10 @@
 
 /** How a basis stores the displacements of its vertices. */
 typedef enum supine_warp_storage {
-  SUPINE_FIELD_STORAGE_BEST,    /**< clusters if their error is small beside that of the modes */
-  SUPINE_FIELD_STORAGE_MODES,   /**< a vector for each mode and vertex */
-  SUPINE_FIELD_STORAGE_CLUSTERS /**< clusters, as many as their error demands */
+  SUPINE_FIELD_STORAGE_BEST,     /**< clusters if their error is small beside that of the modes */
+  SUPINE_FIELD_STORAGE_MODES,    /**< a vector for each mode and vertex */
+  SUPINE_FIELD_STORAGE_CLUSTERS, /**< clusters, as many as their error demands */
+  SUPINE_FIELD_STORAGE_COUNT
 } supine_warp_storage;
 
 /** Find clusters for the modes of a fit. Those of BEST raise the error of the fit by half at most,

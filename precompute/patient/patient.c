@@ -10,7 +10,9 @@
 #include "precompute/physics/model.h"
 #include "runtime/kriging.h"
 
-const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {"deep", "paper", NULL};
+#define NAME(id, name) name,
+const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1] = {
+    SUPINE_PATIENT_LAWS(NAME) NULL};
 
 /* Distance by which a lung extends beyond its outermost landmarks, mm: 5 to 15 in ten patients. */
 static const double landmark_margin = 10.0;

@@ -20,12 +20,18 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/physics/force.h"
 
+/** What is fitted to a patient: FIT(identifier, name). DEEP: constants at or near those of the
+ * default law (model.h). PAPER: nine constants, with a wide prior. */
+#define SUPINE_PATIENT_LAWS(FIT) FIT(DEEP, "deep") FIT(PAPER, "paper")
+
 typedef enum supine_patient_law {
-  SUPINE_PATIENT_DEEP = 0, /**< constants at or near those of the default law (model.h) */
-  SUPINE_PATIENT_PAPER,    /**< nine constants fitted to the patient, with a wide prior */
-  SUPINE_PATIENT_LAW_COUNT
+#define SUPINE_PATIENT_LAW_ENUM(id, name) SUPINE_PATIENT_##id,
+  SUPINE_PATIENT_LAWS(SUPINE_PATIENT_LAW_ENUM)
+#undef SUPINE_PATIENT_LAW_ENUM
+      SUPINE_PATIENT_LAW_COUNT
 } supine_patient_law;
 
+/** Names of the fitted laws, ended by NULL. */
 extern const char *const supine_patient_law_names[SUPINE_PATIENT_LAW_COUNT + 1];
 
 /** Motion of the body between two scans, to be fitted. The value is its number of unknowns. */

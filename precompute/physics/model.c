@@ -8,11 +8,13 @@
 
 #define LIST(...)                                                                                  \
   { __VA_ARGS__ }
-#define MODEL(id, name, base_, gain_, box_, constants, shear_, bend_, reach_, pair_, what)         \
+#define MODEL(id, name, base_, gain_, box_, constants, shear_, bend_, reach_, pair_, from_scan_,   \
+              what)                                                                                \
   {.law = SUPINE_LAW_##id,                                                                         \
    .force = {.base = base_, .gain = gain_, .box = LIST box_, .pair = pair_},                       \
    .direction = {.c = LIST constants, .shear = shear_},                                            \
    .bend = LIST bend_,                                                                             \
+   .from_scan = from_scan_,                                                                        \
    .reach = reach_,                                                                                \
    .share = {1.0, 1.0}},
 #define NAME(id, name, ...) name,

@@ -9,10 +9,10 @@
 #include "precompute/physics/strain.h"
 
 /* clang-format off */
-/** The displacement laws: LAW(identifier, name, base, gain, box, c, shear, bend, reach, pair, help
- * text).
+/** The displacement laws: LAW(identifier, name, base, gain, box, c, shear, bend, reach, pair,
+ * from_scan, help text).
  * Of these, base, gain, box and pair are members of supine_force_law, c and shear are members of
- * supine_direction_law, and bend and reach are members of supine_model.
+ * supine_direction_law, and bend, reach and from_scan are members of supine_model.
  *
  * The constants of [Santhanam2008], Table I, are not available. The direction constants c are fits:
  * "paper" to 4-D CT landmarks of ten patients (DIR-Lab), "deep" to the full breaths of ten others
@@ -38,8 +38,8 @@
  * uppermost, rises from 1.4 to 1.6 (expected: 1). */
 #define SUPINE_LAWS(LAW)                                                                           \
   LAW(DEEP, "deep", 0.875, 0.4, (0, -0.15, 0), (6, 2.6, 15, 1, 16, 1.3), 0.4, (0, -0.45, 0.45), 10,   \
-      true, "displacement from full inflation, for any posture and volume")                              \
-  LAW(PAPER, "paper", 0, 1, (0, 0, 0), (2, 1.5, 1.5, 1, 16, 1.4), 0, (0, 0, 0), 0, false,          \
+      true, false, "displacement from full inflation, for any posture and volume")                              \
+  LAW(PAPER, "paper", 0, 1, (0, 0, 0), (2, 1.5, 1.5, 1, 16, 1.4), 0, (0, 0, 0), 0, false, true,    \
       "as Santhanam 2008 published it: displacement from the shape in the scan (whose "            \
       "state is not used)")
 /* clang-format on */
@@ -59,6 +59,8 @@ typedef struct supine_model {
   const double *stiffness; /**< [vertices] stiffness; NULL for 1 everywhere */
   const double *lesions; /**< [vertices] factors that multiply the normalised stiffness, or NULL */
   supine_strain *strain; /**< effect of stiffness and lesions if reach > 0, or NULL; not owned */
+  bool from_scan;        /**< whether displacements count from the scan, in every posture, instead
+                            of from full inflation */
   double reach;          /**< smoothing length of force, mm; 0 for the method of [Santhanam2008] */
   double share[2];       /**< volume of each lung divided by its volume without disease */
 } supine_model;

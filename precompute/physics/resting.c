@@ -137,7 +137,8 @@ supine_status supine_physics_resting_set(supine_resting *resting, const char *po
   return supine_physics_resting_settle(resting, 0, NULL, NULL, error);
 }
 
-static const char *const names[6] = {"left", "right", "supine", "prone", "inverted", "upright"};
+const char *const supine_physics_resting_names[SUPINE_RESTING_POSTURES + 1] = {
+    "left", "right", "supine", "prone", "inverted", "upright", NULL};
 
 supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, double ml,
                                           const double share[2], supine_error *error) {
@@ -152,7 +153,7 @@ supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, 
   SUPINE_REFUSE_IF(!fits, error, SUPINE_ERROR_ARGUMENT,
                    "volume at rest in posture %s: give a volume of gas and tissue in mL, or shares "
                    "of the full volume above %g and at most %g",
-                   names[axis], least_share, most_share);
+                   supine_physics_resting_names[axis], least_share, most_share);
   resting->given[axis] = true;
   resting->ml[axis] = ml;
   if (ml == 0.0) {
@@ -165,9 +166,9 @@ supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, 
 void supine_physics_resting_print(const supine_resting *resting, char *text, size_t size) {
   size_t used = 0;
   for (size_t axis = 0; axis < 6 && used < size; ++axis) {
-    used +=
-        (size_t)supine_print_text(text + used, size - used, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
-                                  names[axis], resting->share[0][axis], resting->share[1][axis]);
+    used += (size_t)supine_print_text(text + used, size - used, "%s%s=%.4g/%.4g",
+                                      axis == 0 ? "" : ",", supine_physics_resting_names[axis],
+                                      resting->share[0][axis], resting->share[1][axis]);
   }
 }
 
@@ -203,12 +204,12 @@ supine_status supine_physics_resting_settle(supine_resting *resting, size_t coun
       }
       fits = fits && is_share(*share);
     }
-    SUPINE_REFUSE_ADVISE(!relative && !fits, error, SUPINE_REMEDY_SCAN_OR_REST_GIVE,
-                         SUPINE_ERROR_ARGUMENT,
-                         "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
-                         "posture %s",
-                         full[0] + (count > 1 ? full[1] : 0.0),
-                         at_rest(resting, axis, count, side, full), names[axis]);
+    SUPINE_REFUSE_ADVISE(
+        !relative && !fits, error, SUPINE_REMEDY_SCAN_OR_REST_GIVE, SUPINE_ERROR_ARGUMENT,
+        "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
+        "posture %s",
+        full[0] + (count > 1 ? full[1] : 0.0), at_rest(resting, axis, count, side, full),
+        supine_physics_resting_names[axis]);
     resting->ml[axis] = relative ? resting->ml[axis] : 0.0;
   }
   return SUPINE_OK;

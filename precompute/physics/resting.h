@@ -38,6 +38,11 @@
 /** Usual share of the left lung in the full volume of both lungs. */
 #define SUPINE_LEFT_SHARE 0.45
 
+enum { SUPINE_RESTING_POSTURES = 6 };
+
+/** Names of the postures with gravity along +x, -x, +y, -y, +z, -z, ended by NULL. */
+extern const char *const supine_physics_resting_names[SUPINE_RESTING_POSTURES + 1];
+
 /** Volumes at rest in six postures, with gravity along +x, -x, +y, -y, +z, -z: lying on the left,
  * on the right, supine, prone, head down, upright. */
 typedef struct supine_resting {

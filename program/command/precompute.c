@@ -10,6 +10,7 @@
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/library.h"
+#include "precompute/names.h"
 #include "program/command/list.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
@@ -37,8 +38,6 @@ static supine_status read_modes(const char *text, void *field, supine_error *err
 }
 
 #define FILLS(member) SUPINE_FILLS(request, member)
-
-static const char *const storages[] = {"best", "modes", "clusters", NULL};
 
 static const supine_option table[] = {
     {"output", 'o', "FILE", "basis file to write (.safetensors)", FILLS(path), .required = true,
@@ -90,7 +89,8 @@ static const supine_option table[] = {
      "they "
      "raise the error by half at most",
      .offset = offsetof(request, model.precompute.modes.storage), .kind = SUPINE_OPTION_CHOICE,
-     .size = sizeof(supine_precompute_storage), .choices = storages, .standard = "best",
+     .size = sizeof(supine_precompute_storage), .choices = supine_precompute_storages,
+     .standard = "best",
      .partners = "output fields band modes without-normals axes units midline labels edge close "
                  "surfaces-out scanned resting full",
      .more = true},

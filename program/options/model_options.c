@@ -5,6 +5,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "precompute/names.h"
 #include "precompute/patient/checks.h"
 #include "program/options/model_options.h"
 #include "program/options/state_options.h"
@@ -107,11 +108,9 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
   return SUPINE_OK;
 }
 
-static const char *const sexes[] = {"unknown", "female", "male", NULL};
-
 /* Parts of help texts: a line that describes each displacement law, and the defaults of its
  * constants. */
-#define LAW_HELP(id, name, base, gain, box, constants, shear, bend, reach, pair, what)             \
+#define LAW_HELP(id, name, base, gain, box, constants, shear, bend, reach, pair, from_scan, what)  \
   name ": " what "\n"
 #define LAW_BASE(id, name, base, ...) "; default " #base " for " name
 #define LAW_GAIN(id, name, base, gain, ...) "; default " #gain " for " name
@@ -179,8 +178,8 @@ const supine_option supine_options_model[] = {
      "them, the range of adults is printed",
      FILLS(precompute.volumes.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm",
      .more = true},
-    {"sex", 0, "SEX", "female or male", FILLS(precompute.volumes.sex), .choices = sexes,
-     .more = true},
+    {"sex", 0, "SEX", "female or male", FILLS(precompute.volumes.sex),
+     .choices = supine_precompute_sexes, .more = true},
     {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
              "depth h along gravity is 0 at the uppermost vertex and 1 at the lowermost. X, Y and "
              "Z are coordinates in the bounding box, from 0 to 1: X from the midline outwards, Y "
@@ -283,9 +282,6 @@ static int show_progress(void *progress, double fraction) {
 supine_status supine_options_prepare(const char *command, supine_model_options *model,
                                      const supine_arguments *given, supine_prepared *prepared,
                                      supine_error *error) {
-  static const supine_precompute_law_kind kinds[SUPINE_LAW_COUNT] = {
-      [SUPINE_LAW_DEEP] = SUPINE_PRECOMPUTE_LAW_DEEP,
-      [SUPINE_LAW_PAPER] = SUPINE_PRECOMPUTE_LAW_PAPER};
   supine_precompute_options *options = &model->precompute;
   const supine_volume *full = &model->full.volume;
   SUPINE_REFUSE_IF(
@@ -302,7 +298,7 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
     options->lungs.axes = model->axes;
   }
   if (model->has_law) {
-    options->law.kind = kinds[model->law];
+    options->law.kind = supine_precompute_law_of((supine_law)model->law);
   }
   supine_progress progress = supine_options_progress_begin("label map");
   options->progress = show_progress;

@@ -77,9 +77,10 @@ typedef struct supine_precompute_scan {
 
 typedef enum supine_precompute_law_kind {
   SUPINE_PRECOMPUTE_LAW_DEFAULT =
-      0,                      /**< PAPER if the state of the scan is unknown, otherwise DEEP */
-  SUPINE_PRECOMPUTE_LAW_DEEP, /**< displacement from full inflation, in any state */
-  SUPINE_PRECOMPUTE_LAW_PAPER /**< displacement from the scan, as [Santhanam2008] */
+      0,                       /**< PAPER if the state of the scan is unknown, otherwise DEEP */
+  SUPINE_PRECOMPUTE_LAW_DEEP,  /**< displacement from full inflation, in any state */
+  SUPINE_PRECOMPUTE_LAW_PAPER, /**< displacement from the scan, as [Santhanam2008] */
+  SUPINE_PRECOMPUTE_LAW_COUNT
 } supine_precompute_law_kind;
 
 /** How gravity and volume move the surface: the force on a vertex, and its displacement by a unit
@@ -144,7 +145,8 @@ typedef struct supine_precompute_rest {
 typedef enum supine_precompute_sex {
   SUPINE_PRECOMPUTE_SEX_UNKNOWN = 0,
   SUPINE_PRECOMPUTE_FEMALE,
-  SUPINE_PRECOMPUTE_MALE
+  SUPINE_PRECOMPUTE_MALE,
+  SUPINE_PRECOMPUTE_SEX_COUNT
 } supine_precompute_sex;
 
 /** What is known of the patient's volumes. With fields over gravity and volume, rest and full
@@ -161,7 +163,8 @@ typedef struct supine_precompute_volumes {
 typedef enum supine_precompute_storage {
   SUPINE_PRECOMPUTE_STORAGE_BEST = 0, /**< clusters if their error is small beside that of modes */
   SUPINE_PRECOMPUTE_STORAGE_MODES,    /**< a vector for each mode: 3 K + 3 products a vertex */
-  SUPINE_PRECOMPUTE_STORAGE_CLUSTERS  /**< clusters of vertices that move alike: 15 products */
+  SUPINE_PRECOMPUTE_STORAGE_CLUSTERS, /**< clusters of vertices that move alike: 15 products */
+  SUPINE_PRECOMPUTE_STORAGE_COUNT
 } supine_precompute_storage;
 
 /** What the basis is to contain. */
@@ -221,8 +224,8 @@ typedef struct supine_precompute_report {
   double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the
                            largest volumes, predicted from the others; 0 if unknown */
   size_t cluster_count; /**< clusters of vertices that move alike; 0 if modes are stored */
-  /** Of fields: RMS displacement of all runs, mm; the direction of gravity nearest to that of supine
-   * posture, LPS; and the mean displacement along gravity in it, mm. */
+  /** Of fields: RMS displacement of all runs, mm; the direction of gravity nearest to that of
+   * supine posture, LPS; and the mean displacement along gravity in it, mm. */
   double displacement, nearest_supine[3], along_gravity;
   /** RMS error as a fraction of the RMS of the part of the displacement that depends on gravity; 0
    * if there is none. */
@@ -260,6 +263,10 @@ SUPINE_API supine_status supine_precompute_basis(const supine_precompute_options
                                                  supine_error *error);
 
 SUPINE_API void supine_precompute_result_free(supine_precompute_result *result);
+
+/** Return the names of an option's values, ended by NULL: of "law", from SUPINE_PRECOMPUTE_LAW_DEEP
+ * on; of "resting", the postures; of "sex"; and of "storage". Return NULL for other texts. */
+SUPINE_API const char *const *supine_precompute_names(const char *option);
 
 #ifdef __cplusplus
 }

@@ -333,6 +333,15 @@ def string(text: Optional[bytes]) -> str:
     return (text or b"").decode(errors="replace")
 
 
+def names_of(option: str) -> list[str]:
+    """Return the names of the values of an option of the offline library."""
+    library, found = offline(), []
+    names = library.supine_precompute_names(option.encode()) if library else [None]
+    while names[len(found)] is not None:
+        found.append(string(names[len(found)]))
+    return found
+
+
 def offline() -> Optional[ctypes.CDLL]:
     """Load the offline library (GPL), or return None if it is not installed."""
     path = _path("supine_precompute")
@@ -342,4 +351,6 @@ def offline() -> Optional[ctypes.CDLL]:
     library.supine_precompute_basis.argtypes = POINTER(PrecomputeOptions), POINTER(POINTER(Result)), POINTER(CError)
     library.supine_precompute_result_free.argtypes = POINTER(Result),
     library.supine_precompute_result_free.restype = None
+    library.supine_precompute_names.argtypes = c_char_p,
+    library.supine_precompute_names.restype = POINTER(c_char_p)
     return library

@@ -11,10 +11,6 @@ import numpy as np
 from . import _library as _c
 
 _UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "in": 25.4}
-_POSTURES = ("left", "right", "supine", "prone", "inverted", "upright")
-_SEXES = {"unknown": 0, "female": 1, "male": 2}
-_LAWS = {"deep": 1, "paper": 2}
-_STORAGES = {"best": 0, "modes": 1, "clusters": 2}
 
 
 def _refuse(name: str, wants: str, value: Any) -> _c.ArgumentError:
@@ -45,10 +41,12 @@ def _numbers(name: str, value: Any, count: int) -> Any:
     return (_c.c_double * count)(*(_number(name, part) for part in parts))
 
 
-def _choice(name: str, value: Any, choices: dict[str, int]) -> int:
-    if value not in choices:
-        raise _refuse(name, " or ".join(choices), value)
-    return choices[value]
+def _choice(name: str, value: Any) -> int:
+    """Return the index of a value among those that the C library names for an option."""
+    names = _c.names_of(name)
+    if value not in names:
+        raise _refuse(name, " or ".join(names), value)
+    return names.index(value)
 
 
 def _path(value: Any) -> bytes:
@@ -82,10 +80,11 @@ def _resting(to: _c.PrecomputeOptions, value: Any) -> None:
     if isinstance(value, str) and "copd" in value.split(","):
         to.volumes.copd = True
         value = ",".join(part for part in value.split(",") if part != "copd")
+    postures = _c.names_of("resting")
     for posture, amount in _pairs("resting", value, "=", wants) if value else []:
-        if posture not in _POSTURES:
-            raise _c.ArgumentError(f"resting: '{posture}' is not one of {', '.join(_POSTURES)}")
-        rest, text = to.volumes.rest[_POSTURES.index(posture)], str(amount)
+        if posture not in postures:
+            raise _c.ArgumentError(f"resting: '{posture}' is not one of {', '.join(postures)}")
+        rest, text = to.volumes.rest[postures.index(posture)], str(amount)
         if text.endswith("mL"):
             rest.ml = _number("resting", text[:-2], wants)
         else:
@@ -193,13 +192,13 @@ _FILL: dict[str, Callable[[Any, Any], None]] = {
     "surfaces_out": _set("lungs", "surfaces_out", _path),
     "scanned": _scanned, "resting": _resting, "full": _full,
     "height": _set("volumes", "height", lambda value: _number("height", value)),
-    "sex": _set("volumes", "sex", lambda value: _choice("sex", value, _SEXES)),
-    "law": _set("law", "kind", lambda value: _choice("law", value, _LAWS)),
+    "sex": _set("volumes", "sex", lambda value: _choice("sex", value)),
+    "law": _set("law", "kind", lambda value: 1 + _choice("law", value)),
     **{part: _law(part) for part in ("base", "gain", "box_force", "soften", "constants", "shear", "reach")},
     "expandability": _expandability, "lesion": _lesion, "lung": _lung,
     "band": _band, "modes": _modes, "held_out": _held_out,
     "without_normals": _set("modes", "without_normals", bool),
-    "storage": _set("modes", "storage", lambda value: _choice("storage", value, _STORAGES)),
+    "storage": _set("modes", "storage", lambda value: _choice("storage", value)),
     "patient": _set("", "patient", _path), "fields": _set("", "fields", _path)}
 
 
