@@ -90,6 +90,10 @@ if(EGL_FOUND AND NOT SUPINE_SANITIZE MATCHES "thread")
   set_tests_properties(glsl PROPERTIES ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;LIBGL_ALWAYS_SOFTWARE=1")
 endif()
 
+# Follow the recipes of CONTRIBUTING.md on a copy of the sources.
+add_test(NAME recipes COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/recipes.py ${PROJECT_SOURCE_DIR})
+set_tests_properties(recipes PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1800)
+
 # Check that the sources follow the table of folders in ARCHITECTURE.md.
 if(Python3_FOUND)
   add_test(NAME house COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/house.py
