@@ -177,7 +177,7 @@ def numbers(path):
 
 def see(supine):
     print("what was added works:", flush=True)
-    lung = "examples/lungs/left.ply"
+    lung = "examples/lungs/left.obj"
     text = run(supine, "precompute", lung, "--law", "even", "--band", "5", "--without-normals", "-o", "even.safetensors")
     check("even law" in text, "precompute names the law")
     run(supine, "precompute", lung, "--band", "5", "--without-normals", "-o", "deep.safetensors")
