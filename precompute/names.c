@@ -8,6 +8,7 @@
 #include "precompute/fields/storage.h"
 #include "precompute/names.h"
 #include "precompute/physics/model.h"
+#include "precompute/physics/reference.h"
 #include "precompute/physics/resting.h"
 
 const char *const supine_precompute_sexes[] = {[SUPINE_PRECOMPUTE_SEX_UNKNOWN] = "unknown",
@@ -23,6 +24,9 @@ const char *const supine_precompute_storages[] = {[SUPINE_PRECOMPUTE_STORAGE_BES
 _Static_assert((int)SUPINE_PRECOMPUTE_STORAGE_COUNT == (int)SUPINE_FIELD_STORAGE_COUNT &&
                    (int)SUPINE_PRECOMPUTE_STORAGE_CLUSTERS == (int)SUPINE_FIELD_STORAGE_CLUSTERS,
                "supine_precompute_storage has the values of supine_warp_storage");
+_Static_assert((int)SUPINE_PRECOMPUTE_FEMALE == (int)SUPINE_SEX_FEMALE &&
+                   (int)SUPINE_PRECOMPUTE_MALE == (int)SUPINE_SEX_MALE,
+               "supine_precompute_sex has the values of supine_sex");
 _Static_assert((int)SUPINE_REST_COUNT == (int)SUPINE_RESTING_POSTURES, "as many postures");
 
 const char *const *supine_precompute_names(const char *option) {

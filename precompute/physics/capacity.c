@@ -27,17 +27,28 @@ static const double least_gas = 1000.0; /* or below this gas at rest, supine, mL
 static const double agreement = 0.05;
 
 static const struct {
+  supine_sex sex;
   double slope, offset; /* capacity in L is slope x height in m - offset */
   double usual[2];      /* range of an adult's height if it is unknown, cm */
   double measured[2];   /* range of the heights for which the equation is stated, cm */
-} of[2] = {{6.60, 5.79, {150.0, 180.0}, {145.0, 180.0}},
-           {7.99, 7.08, {160.0, 195.0}, {155.0, 195.0}}}; /* [0] women, [1] men */
+} equations[] = {{SUPINE_SEX_FEMALE, 6.60, 5.79, {150.0, 180.0}, {145.0, 180.0}},
+                 {SUPINE_SEX_MALE, 7.99, 7.08, {160.0, 195.0}, {155.0, 195.0}}};
+enum { EQUATIONS = sizeof equations / sizeof *equations };
+
+/* Return whether an equation is for a person; both are if the sex is unknown. */
+static bool is_for(size_t equation, const supine_person *person) {
+  return person->sex == SUPINE_SEX_UNKNOWN || person->sex == equations[equation].sex;
+}
 
 bool supine_physics_reference_height_is_told(const supine_person *person, double range[2]) {
-  const bool man = person->sex == SUPINE_SEX_MALE;
-  const bool woman = person->sex == SUPINE_SEX_FEMALE;
-  range[0] = of[man].measured[0];
-  range[1] = of[!woman].measured[1];
+  range[0] = INFINITY;
+  range[1] = 0.0;
+  for (size_t k = 0; k < EQUATIONS; ++k) {
+    if (is_for(k, person)) {
+      range[0] = fmin(range[0], equations[k].measured[0]);
+      range[1] = fmax(range[1], equations[k].measured[1]);
+    }
+  }
   return person->height > 0.0 &&
          (supine_input_judge(SUPINE_INPUT_HEIGHT_LEAST, person->height / range[0]) !=
               SUPINE_INPUT_TAKEN ||
@@ -48,13 +59,14 @@ bool supine_physics_reference_height_is_told(const supine_person *person, double
 void supine_physics_reference_capacity(const supine_person *person, double range[2]) {
   range[0] = INFINITY;
   range[1] = 0.0;
-  for (int sex = 0; sex < 2; ++sex) {
-    if (person->sex != SUPINE_SEX_UNKNOWN && (int)person->sex != sex + 1) {
+  for (size_t k = 0; k < EQUATIONS; ++k) {
+    if (!is_for(k, person)) {
       continue;
     }
     for (int end = 0; end < 2; ++end) {
-      const double height = person->height > 0.0 ? person->height : of[sex].usual[end];
-      const double upright = 1e3 * fmax(0.0, of[sex].slope * 1e-2 * height - of[sex].offset);
+      const double height = person->height > 0.0 ? person->height : equations[k].usual[end];
+      const double upright =
+          1e3 * fmax(0.0, equations[k].slope * 1e-2 * height - equations[k].offset);
       const double full = upright / (1.0 + SUPINE_FULL_UPRIGHT_GAIN) + SUPINE_TISSUE_ML;
       range[0] = fmin(range[0], full);
       range[1] = fmax(range[1], full);
