@@ -15,7 +15,7 @@ const FRAME = 24; // SUPINE_GL_FRAME_FLOATS
 const KINDS_OF_VOLUME = { rest: 1, full: 2, scan: 3 }; // supine_volume_kind
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
 const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper",
-  ', or open the basis with allowFolds'];
+  ", or open the basis with allowFolds"];
 const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a smaller gain';
 /** Metadata "checksum" of a file that open() completes (its option `seal`). */
 export const UNSEALED = 'xxh64:0000000000000000';
