@@ -35,7 +35,7 @@ static const supine_input inputs[] = {
     .evidence = EVIDENCE("definition"), .remedy = "give -180 to 180 degrees; + turns to the left", .interfaces = ALL},
   [SUPINE_INPUT_VOLUME_FINITE] = {
     .name = "volume-finite", .group = "State", .input = "a volume", .against = "finite numbers",
-    .measured = "numbers that are not finite", .told = NAN, .refused = 0, .evidence = EVIDENCE("definition"),
+    .measured = "number, mL; NaN counts as beyond", .told = NAN, .refused = 1e15, .evidence = EVIDENCE("definition; no lung holds 1e15 mL"),
     .remedy = "give a number of mL", .interfaces = ALL},
   [SUPINE_INPUT_VOLUME_LEAST] = {
     .name = "volume-least", .group = "State", .input = "a volume of the lungs",
@@ -53,6 +53,12 @@ static const supine_input inputs[] = {
     .told = NAN, .refused = 0.01, .evidence = EVIDENCE("six postures at rest and at full inflation: no triangle; the margin is assumed"),
     .people = 7, .n = 144,
     .remedy = "choose a volume nearer to rest, or allow folds", .interfaces = ALL},
+  [SUPINE_INPUT_GAIN] = {
+    .name = "gain", .group = "State", .input = "a gain of lungs whose range of volumes is unknown",
+    .against = "1, which reproduces another simulator's displacements", .measured = "gain, without its sign",
+    .told = NAN, .refused = 5, .evidence = EVIDENCE("assumed: gravity in m/s^2 instead of a gain is refused"),
+    .remedy = "give a gain near 1, or allow folds",
+    .interfaces = SUPINE_INPUT_BY_C | SUPINE_INPUT_BY_PYTHON | SUPINE_INPUT_BY_JAVASCRIPT},
   [SUPINE_INPUT_FIELD_FOLDS] = {
     .name = "field-folds", .group = "State", .input = "a displacement field of a state",
     .against = "the cells inside the lungs", .measured = "share of cells that fold",
@@ -63,6 +69,11 @@ static const supine_input inputs[] = {
     .against = "full inflation", .measured = "share of full inflation at the breath's end",
     .told = 1, .refused = 1.2, .evidence = EVIDENCE("told: definition of full inflation; refused: assumed, as for volumes"),
     .remedy = "choose a smaller breath", .interfaces = COMMAND},
+  [SUPINE_INPUT_BREATH_LEAST] = {
+    .name = "breath-least", .group = "State", .input = "the tidal volume of a breath",
+    .against = "litres instead of mL", .measured = "tidal volume, mL", .below = true,
+    .told = NAN, .refused = 20, .evidence = EVIDENCE("assumed: a newborn breathes about 20 mL"),
+    .remedy = "give the volume in mL", .interfaces = OFFLINE},
   [SUPINE_INPUT_STATE_MEMBERS] = {
     .name = "state-members", .group = "State", .input = "a state as an object or an array",
     .against = "the members that a state has", .measured = "members that are unknown",
@@ -103,6 +114,11 @@ static const supine_input inputs[] = {
     .against = "the volume of tissue", .measured = "gas, mL", .below = true,
     .told = 0, .refused = NAN, .evidence = EVIDENCE("definition; the tissue of an adult is 860 mL"),
     .remedy = "check the unit and the state of the scan", .interfaces = OFFLINE},
+  [SUPINE_INPUT_LUNG_SHARE] = {
+    .name = "lung-share", .group = "Patient", .input = "the share of its volume that a collapsed lung holds",
+    .against = "the tissue alone", .measured = "share of the lung's volume", .below = true,
+    .told = NAN, .refused = 0.1, .evidence = EVIDENCE("assumed: tissue alone fills about 0.1 of full inflation"),
+    .remedy = "give the share that remains, such as 0.3", .interfaces = OFFLINE},
   [SUPINE_INPUT_LUNGS_SMALL] = {
     .name = "lungs-small", .group = "Patient", .input = "lungs at full inflation",
     .against = "an adult's lungs", .measured = "volume of both lungs, mL", .below = true,

@@ -14,10 +14,14 @@
 
 #include <supine/status.h>
 
-/** Parse a number as strtod does in the C locale.
+/** Parse a number as strtod does in the C locale, but no hexadecimal one: of 0x10, only the 0.
  * @param end  set to the first character after the number; to `text` if there is no number
  * @return the number; 0 if there is none */
 double supine_number_parse(const char *text, char **end);
+
+/** Shorten each run of more than 20 digits in a text, such as those of 1e308 printed by %.0f, to a
+ * power of ten: 1.79e+308. */
+void supine_number_shorten(char *text);
 
 /** Print like snprintf in the C locale. */
 SUPINE_PRINTF(3, 4)

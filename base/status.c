@@ -20,11 +20,12 @@ const char *supine_status_string(supine_status status) {
 
 supine_status supine_error_set(supine_error *error, supine_status status, const char *format, ...) {
   if (error != NULL) {
-    char message[sizeof error->message];
+    char message[4 * sizeof error->message]; /* with room for numbers before they are shortened */
     va_list arguments;
     va_start(arguments, format);
     (void)supine_print_text_list(message, sizeof message, format, arguments);
     va_end(arguments);
+    supine_number_shorten(message);
     error->status = status;
     error->remedy = SUPINE_REMEDY_NONE;
     error->value[0] = '\0';

@@ -253,10 +253,11 @@ static supine_status set_shares(const supine_precompute_tissue *tissue, supine_p
       ++lung;
     }
     if (share != 0.0) {
-      SUPINE_REFUSE_IF(!(share > 0.0 && share <= 1.0), error, SUPINE_ERROR_ARGUMENT,
-                       "the %s lung's share of its healthy volume, %g, must be above 0 and at most "
-                       "1",
-                       name, share);
+      const double least = supine_input_get(SUPINE_INPUT_LUNG_SHARE)->refused;
+      SUPINE_REFUSE_IF(!(share >= least && share <= 1.0), error, SUPINE_ERROR_ARGUMENT,
+                       "the %s lung's share of its healthy volume is %g: give %g, which the tissue "
+                       "alone fills, to 1",
+                       name, share, least);
       SUPINE_REFUSE_IF(
           lung == lungs->lung_count, error, SUPINE_ERROR_ARGUMENT,
           "a share of the %s lung was given, but the model has no %s lung: leave it out", name,
@@ -500,9 +501,15 @@ static supine_status set_model(const supine_precompute_options *options,
  * scanned lungs, at full inflation, can hardly hold it. */
 static supine_status check_height(const knowledge *known, const supine_resting *resting,
                                   supine_prepared *p, supine_error *error) {
+  static const double least = 50.0; /* cm */
+  static const double most = 250.0;
+  const double height = known->person.height;
   const supine_lungs *lungs = &p->source.lungs;
   double full = -known->scan.state.volume.ml;
   double range[2];
+  SUPINE_REFUSE_IF(
+      height != 0.0 && !(height >= least && height <= most), error, SUPINE_ERROR_ARGUMENT,
+      "the height is %g cm: give %g to %g cm, such as 175 (1.75 m)", height, least, most);
   if (supine_physics_reference_height_is_told(&known->person, range)) {
     supine_findings_add(&p->source.findings,
                         "warning: the height of %g cm is outside the %.0f to %.0f cm of the adults "

@@ -4,6 +4,7 @@
 #include <stdbool.h>
 
 #include <supine/breath.h>
+#include <supine/inputs.h>
 
 #include "base/arena.h"
 
@@ -181,9 +182,11 @@ supine_pv_breath supine_breath_default(void) {
 }
 
 static supine_status breath_check(const supine_pv_breath *breath, supine_error *error) {
-  if (!(breath->tidal > 0.0) || !isfinite(breath->tidal)) {
+  if (!isfinite(breath->tidal) ||
+      supine_input_judge(SUPINE_INPUT_BREATH_LEAST, breath->tidal) == SUPINE_INPUT_REFUSED) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "the tidal volume is %g mL: give a volume above 0", breath->tidal);
+                            "the tidal volume is %g mL: give %g mL or more, such as 500 mL",
+                            breath->tidal, supine_input_get(SUPINE_INPUT_BREATH_LEAST)->refused);
   }
   if (!(breath->rate > 0.0) || !isfinite(breath->rate)) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,

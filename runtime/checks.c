@@ -56,13 +56,18 @@ bool supine_basis_has_range_of_volumes(const supine_basis *basis) {
   return basis->volume_range != NULL;
 }
 
-bool supine_basis_can_hold(const supine_basis *basis, const supine_state *state,
-                           const supine_pose *pose, char *wrong, size_t size) {
+bool supine_basis_allows_folds(const supine_basis *basis) {
+  return basis->allow_folds;
+}
+
+/* Return whether lungs can hold the volumes of a pose. If not, write to `wrong` what is wrong. */
+static bool can_hold(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
+                     char *wrong, size_t size) {
   const supine_basis_info *info = &basis->info;
   double volumes[SUPINE_LUNGS_MAX];
   double total = 0;
   double full = 0;
-  if (basis->volume_range == NULL || supine_basis_is_scan(basis, state) ||
+  if (!info->has_rest || info->is_fields || supine_basis_is_scan(basis, state) ||
       supine_basis_volumes(basis, pose, volumes) != SUPINE_OK) {
     return true;
   }
@@ -85,6 +90,9 @@ bool supine_basis_can_hold(const supine_basis *basis, const supine_state *state,
       describe_share(whose, volumes[lung], own_full, wrong, size);
       return false;
     }
+    if (basis->volume_range == NULL) {
+      continue;
+    }
     find_range(basis, state->gravity, lung, range);
     if (!(volumes[lung] >= range[0] && volumes[lung] <= range[1])) {
       (void)supine_print_text(
@@ -102,19 +110,56 @@ bool supine_basis_can_hold(const supine_basis *basis, const supine_state *state,
 supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
                                  const supine_pose *pose, supine_error *error) {
   char wrong[256];
-  if (supine_basis_can_hold(basis, state, pose, wrong, sizeof wrong)) {
+  if (can_hold(basis, state, pose, wrong, sizeof wrong)) {
     return SUPINE_OK;
   }
   char text[160];
   (void)supine_state_describe(state, text, sizeof text);
-  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "%s: %s: choose a volume nearer to rest, or allow folds", text, wrong);
+  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: %s: choose a volume nearer to rest",
+                         text, wrong);
+  supine_error_advise(error, SUPINE_REMEDY_ALLOW_FOLDS, NULL);
+  return SUPINE_ERROR_NUMERICAL;
 }
 
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
                                 supine_pose *pose, supine_error *error) {
   SUPINE_TRY(supine_basis_pose_any(basis, state, pose, error));
   return basis->allow_folds ? SUPINE_OK : supine_basis_check(basis, state, pose, error);
+}
+
+supine_status supine_basis_pose_gain(const supine_basis *basis, const double gravity[3],
+                                     double gain, supine_pose *pose, supine_error *error) {
+  const supine_state state = {.gravity = {gravity[0], gravity[1], gravity[2]}};
+  if (!isfinite(gain)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "the gain is %g: give a finite number, such as 1", gain);
+  }
+  *pose = (supine_pose){.basis = basis->info.identity};
+  switch (supine_basis_weights(basis, gravity, pose->weights)) {
+  case SUPINE_OK:
+    break;
+  case SUPINE_ERROR_UNSUPPORTED:
+    return supine_error_set(error, SUPINE_ERROR_UNSUPPORTED,
+                            "displacements of this basis depend on the volume: give a volume "
+                            "instead of a gain");
+  default:
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "gravity is zero or not finite: give a vector with a direction");
+  }
+  supine_pose_fill(pose, gain);
+  if (basis->allow_folds) {
+    return SUPINE_OK;
+  }
+  if (basis->volume_range == NULL &&
+      supine_input_judge(SUPINE_INPUT_GAIN, fabs(gain)) == SUPINE_INPUT_REFUSED) {
+    (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                           "the gain %.6g multiplies every displacement: give a gain of -%g to %g",
+                           gain, supine_input_get(SUPINE_INPUT_GAIN)->refused,
+                           supine_input_get(SUPINE_INPUT_GAIN)->refused);
+    supine_error_advise(error, SUPINE_REMEDY_ALLOW_FOLDS, NULL);
+    return SUPINE_ERROR_NUMERICAL;
+  }
+  return supine_basis_check(basis, &state, pose, error);
 }
 
 supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Check the volumes of a state without refusing them. */
+/* What is known of the check of volumes (supine_basis_check). */
 #ifndef SUPINE_RUNTIME_CHECKS_H
 #define SUPINE_RUNTIME_CHECKS_H
 
@@ -13,8 +13,7 @@ enum { SUPINE_RANGE_NODES = 27 };
  * lung, mL, at which at most the share of triangles in the check `folds` turn over. */
 bool supine_basis_has_range_of_volumes(const supine_basis *basis);
 
-/* Return whether lungs can hold the volumes of a pose. If not, write to `wrong` what is wrong. */
-bool supine_basis_can_hold(const supine_basis *basis, const supine_state *state,
-                           const supine_pose *pose, char *wrong, size_t size);
+/* Return whether the basis was opened with supine_basis_options.allow_folds. */
+bool supine_basis_allows_folds(const supine_basis *basis);
 
 #endif

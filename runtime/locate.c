@@ -137,7 +137,13 @@ static supine_status initialise(workspace *s, supine_error *error) {
   const bool unknown =
       task->state.lung_count == 0 && variable && task->state.volume.kind == SUPINE_VOLUME_DEFAULT;
   supine_pose pose;
-  const supine_status status = supine_basis_scan_pose(basis, &pose, error);
+  supine_status status = SUPINE_OK;
+  if (variable && !unknown) { /* a given volume is judged */
+    status = supine_basis_pose(basis, &task->state, &pose, error);
+  }
+  if (status == SUPINE_OK) {
+    status = supine_basis_scan_pose(basis, &pose, error);
+  }
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < task->count; ++j) {
       supine_kriging_point *p = &s->points[j];

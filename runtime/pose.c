@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/sh.h>
 
 #include "base/arena.h"
@@ -214,21 +215,28 @@ supine_volume supine_basis_default_volume(const supine_basis *basis) {
   return (supine_volume){SUPINE_VOLUME_SCAN, default_above_scan};
 }
 
+/* Return whether a volume is finite, and not so large that it cannot be one of lungs. */
+static bool is_volume(double ml) {
+  return supine_input_judge(SUPINE_INPUT_VOLUME_FINITE, fabs(ml)) == SUPINE_INPUT_TAKEN;
+}
+
 /* Refuse numbers of lungs and volumes that are out of range or not finite. Other functions check
  * the kinds and the gravity. */
 static supine_status check_state(const supine_state *state, supine_error *error) {
-  bool finite = isfinite(state->lung_count > 0 ? 0 : state->volume.ml);
+  bool finite = is_volume(state->lung_count > 0 ? 0 : state->volume.ml);
   if (state->lung_count > SUPINE_STATE_LUNGS_MAX) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the state names %zu lungs: name at most %d", state->lung_count,
                             (int)SUPINE_STATE_LUNGS_MAX);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
-    finite = finite && isfinite(state->lungs[i].volume.ml);
+    finite = finite && is_volume(state->lungs[i].volume.ml);
   }
   return finite ? SUPINE_OK
                 : supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                   "a volume of the state is not finite: give a number of mL");
+                                   "a volume of the state is not finite, or above %g mL: give a "
+                                   "number of mL",
+                                   supine_input_get(SUPINE_INPUT_VOLUME_FINITE)->refused);
 }
 
 /* Find the gains (factors of the displacement) at which the lungs hold the volume of a state, in a

@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/quantity.h"
 #include "base/vec3.h"
 #include "runtime/words.h"
 
@@ -34,14 +35,10 @@ static const struct {
 
 enum { PIECE = 64 }; /* size of a posture or volume as text, in bytes with its NUL */
 
-/* Read a number, with or without the unit "mL" or "L"; the value is then in mL. */
+/* Read a volume, with or without a unit; the value is in mL. */
 static bool read_number(const char *text, double *value, bool *has_unit) {
-  char *end = NULL;
-  *value = supine_number_parse(text, &end);
-  const bool litres = supine_words_same(end, "L");
-  *has_unit = litres || supine_words_same(end, "mL");
-  *value *= litres ? 1000 : 1;
-  return end != text && (*has_unit || *end == '\0') && isfinite(*value);
+  const char *end = supine_quantity_read(text, SUPINE_QUANTITY_VOLUME, value, has_unit);
+  return end != NULL && *end == '\0';
 }
 
 static supine_status read_volume(const char *text, supine_volume *volume, supine_error *error) {
@@ -141,10 +138,9 @@ static bool read_gravity(const char *text, double gravity[3]) {
 
 /* Read an angle in degrees that follows a sign, up to the end or to `stop`. */
 static bool read_angle(const char *text, char stop, double *degrees, const char **after) {
-  char *end = NULL;
-  *degrees = supine_number_parse(text, &end);
-  *after = end;
-  return end != text && isfinite(*degrees) && (*end == '\0' || (stop != '\0' && *end == stop));
+  bool has_unit = false;
+  *after = supine_quantity_read(text, SUPINE_QUANTITY_ANGLE, degrees, &has_unit);
+  return *after != NULL && (**after == '\0' || (stop != '\0' && **after == stop));
 }
 
 /* A posture that is turned: "supine+15" (tilted), "supine@30" (rolled), "supine@30+15" (both). */

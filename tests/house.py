@@ -205,7 +205,7 @@ def check_opening(files):
 
 
 # Sources of functions that the JavaScript package calls and that have remedies.
-JAVASCRIPT = ("runtime/basis.c", "runtime/pose.c", "runtime/state.c", "runtime/expected.c")
+JAVASCRIPT = ("runtime/basis.c", "runtime/pose.c", "runtime/checks.c", "runtime/state.c", "runtime/expected.c")
 LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
 CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
                   r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")

@@ -84,7 +84,26 @@ def suggested(word):
 
 
 def breath(ml):
-    return {"command": lambda: command("compare", "lungs.safetensors", "--postures", "supine", "--breath", ml)}
+    return {"command": lambda: command("compare", "lungs.safetensors", "--postures", "supine", "--breath", f"{ml}mL")}
+
+
+def gained(gain):
+    """The displacements of lungs whose volumes at rest and at full inflation are unknown, multiplied by a gain."""
+    def basis():
+        if not os.path.exists("unknown.safetensors"):
+            supine.precompute("lungs.ply", scanned="none", held_out=20, output="unknown.safetensors")
+        return supine.open("unknown.safetensors")
+    down = (ctypes.c_double * 3)(0.0, -1.0, 0.0)
+    return {"C": lambda: python(lambda: c.basis_pose_gain(basis()._c, down, gain, supine.Pose())),
+            "Python": lambda: python(lambda: basis().pose("prone").fill(gain)),
+            "JavaScript": lambda: basis() and javascript({"gravity": [0, -1, 0], "gain": gain}, "unknown.safetensors")}
+
+
+def tidal(ml):
+    """A breath of a tidal volume."""
+    breathe = lambda: python(lambda: supine.breath([0.0, 1.0], tidal=ml))
+    return {"command": lambda: command("breathe", "lungs.safetensors", "--posture", "supine", "--fps", "1", "--tidal", f"{ml}mL",
+                                       "-o", "out.vtp"), "C": breathe, "Python": breathe}
 
 
 def field(posture):
@@ -195,12 +214,14 @@ CASES = {
                            state("prone:rest", "full", {"posture": "prone:rest", "volume": "full"}), "refused"),
     "tilt": (state("left+45"), state("supine+500"), "refused"),
     "roll": (state("supine@30"), state("supine@200"), "refused"),
-    "volume-finite": (state("prone:rest+100"), state("prone:rest+nan"), "refused"),
+    "volume-finite": (state("prone:rest+100"), state("prone:rest+1e300"), "refused"),
     "volume-least": (state("prone:2L"), state("prone:50mL"), "refused"),
     "volume-most": (state("supine:full"), state("supine:9L"), "refused"),
     "folds": (state("0:1:-1:2L"), state("0:1:-1:700mL"), "refused"),
     "field-folds": (field("prone:rest"), field("0:1:-1:700mL"), "refused"),
     "breath": (breath(500), breath(3500), "told"),
+    "gain": (gained(1.0), gained(9.81), "refused"),
+    "breath-least": (tidal(500), tidal(0.5), "refused"),
     "state-members": (members({"gravity": [0, -1, 0], "volume": "rest"}), members({"posture": "prone", "volume": "rest"}),
                       "refused"),
     "point-outside": (embedded(-100), embedded(900), "refused"),
@@ -210,6 +231,7 @@ CASES = {
     "height-most": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=200, sex="male"), "told"),
     "rest-share": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=230, sex="male"), "refused"),
     "gas": (made("lungs.ply"), made("tiny.ply", units="mm"), "told"),
+    "lung-share": (made("lungs.ply", lung="left:0.3"), made("lungs.ply", lung="left:0.001"), "refused"),
     "lungs-small": (made("lungs.ply"), made("small.ply", units="mm"), "told"),
     "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
     "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),

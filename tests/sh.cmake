@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 supine_test(base/base supine_base)
 supine_test(base/number supine_base m)
+supine_test(base/quantity supine_base m)
 supine_test(base/csv supine_base)
 supine_test(base/inputs supine_base)
 target_compile_definitions(test_inputs PRIVATE SUPINE_INPUTS_PAGE="${PROJECT_SOURCE_DIR}/docs/inputs.md") # the table of checks

@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/quantity.h"
 #include "base/text.h"
 
 /* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
@@ -66,21 +67,21 @@ static const double parts[2] = {SUPINE_LEFT_SHARE, 1.0 - SUPINE_LEFT_SHARE};
  * ("0.48") or of the left and the right lung ("0.47/0.49"), or mL of both lungs ("2600mL"). Return
  * false if the text has another form or is out of range. */
 static bool read_value(supine_resting *resting, size_t axis, const char *text) {
-  char *end = NULL;
-  const double first = supine_number_parse(text, &end);
+  double first = 0.0;
+  bool in_ml = false;
+  const char *end = supine_quantity_read(text, SUPINE_QUANTITY_VOLUME, &first, &in_ml);
   double share[2] = {first, first};
-  if (end == text) {
+  if (end == NULL) {
     return false;
   }
   resting->given[axis] = true;
-  if (strcmp(end, "mL") == 0) {
+  if (in_ml) {
     resting->ml[axis] = first;
-    return first > 0.0 && isfinite(first);
+    return *end == '\0' && first > 0.0;
   }
   if (*end == '/') {
-    const char *second = end + 1;
-    share[1] = supine_number_parse(second, &end);
-    if (end == second) {
+    end = supine_quantity_read(end + 1, SUPINE_QUANTITY_NUMBER, &share[1], &in_ml);
+    if (end == NULL) {
       return false;
     }
   } else {

@@ -191,17 +191,16 @@ static supine_status write_tensors(playing *p, supine_error *error) {
                                   metadata, sizeof metadata / sizeof *metadata, error);
 }
 
-/* Check the surfaces of smallest and of largest volume with supine_options_pose_check. */
-static supine_status check_ends(const playing *p, supine_error *error) {
+/* Warn of what is wrong with the surfaces of smallest and of largest volume (supine_options_pose).
+ */
+static supine_status tell_ends(const playing *p, supine_error *error) {
   size_t ends[2];
   gsl_stats_minmax_index(&ends[0], &ends[1], p->total, 1, p->wanted->count);
   for (size_t i = 0; i < 2; ++i) {
     supine_pose pose;
     const supine_state state =
         supine_options_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
-    SUPINE_TRY(supine_basis_pose(p->basis, &state, &pose, error));
-    SUPINE_TRY(
-        supine_options_pose_check(p->basis, name, p->wanted->allow_folds, &state, &pose, error));
+    SUPINE_TRY(supine_options_pose(p->basis, name, &state, &pose, error));
   }
   return SUPINE_OK;
 }
@@ -220,7 +219,7 @@ supine_status supine_command_breath_write(const supine_command_breath_frames *wa
   }
   SUPINE_TRY(find_volumes(&p, &pv, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &from, error));
-  SUPINE_TRY(check_ends(&p, error));
+  SUPINE_TRY(tell_ends(&p, error));
   SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
   supine_options_signals_catch(true);
   p.progress = supine_options_progress_begin(name);

@@ -36,12 +36,12 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, frames.turn), .read = supine_options_turn_read,
      .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.help = "The breath:"},
-    {"tidal", 0, "ML",
-     "tidal volume of both lungs, in mL, above rest in the posture, or above the scan if rest is "
-     "unknown; default 500",
-     SUPINE_FILLS(request, frames.breath.tidal), SUPINE_ABOVE_ZERO},
+    {"tidal", 0, "VOLUME",
+     "tidal volume of both lungs, above rest in the posture, or above the scan if rest is unknown; "
+     "default 500mL",
+     SUPINE_FILLS(request, frames.breath.tidal), SUPINE_BREATH},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, frames.breath.rate),
-     SUPINE_ABOVE_ZERO},
+     SUPINE_ABOVE_ZERO, SUPINE_MEASURES(RATE)},
     {"inhale", 0, "SHARE",
      "share of the breath's duration that is spent inhaling, between 0 and 1; default 1/3",
      SUPINE_FILLS(request, frames.breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
@@ -49,10 +49,9 @@ static const supine_option table[] = {
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, frames.pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P",
-     "pressure at the end of an exhalation, in cmH2O; with --pv, of the kind in that file (airway "
-     "or transpulmonary), otherwise transpulmonary; default 5",
-     SUPINE_FILLS(request, frames.breath.rest_pressure), .wants = "a number of cmH2O",
-     .more = true},
+     "pressure at the end of an exhalation; with --pv, of the kind in that file (airway or "
+     "transpulmonary), otherwise transpulmonary; default 5",
+     SUPINE_FILLS(request, frames.breath.rest_pressure), SUPINE_MEASURES(PRESSURE), .more = true},
     {"course", 0, "NAME",
      "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "
      "outflow are constant; default cosine",
@@ -61,8 +60,8 @@ static const supine_option table[] = {
     {.help = "The frames:"},
     {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, frames.fps), SUPINE_ABOVE_ZERO,
      .standard = "66.66"},
-    {"seconds", 0, "S", "duration in s; default the duration of the turn, or of one breath",
-     SUPINE_FILLS(request, duration), SUPINE_ABOVE_ZERO},
+    {"seconds", 0, "S", "duration; default the duration of the turn, or of one breath",
+     SUPINE_FILLS(request, duration), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(TIME)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, frames.from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, frames.as_scanned)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
@@ -105,7 +104,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
   wanted->frames.made_by = given->made_by;
   SUPINE_TRY(complete(wanted, error));
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error));
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, wanted->frames.allow_folds,
+                                       &basis, error));
   return supine_command_breath_write(&wanted->frames, basis, error);
 }
 
@@ -119,10 +119,11 @@ const supine_command supine_command_breathe = {
              "that follows from the pressure-volume relation. The printed compute time per frame "
              "must be below 15 ms for a smooth display.",
     .options = table,
-    .notes = "Examples:\n"
-             "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
-             "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
-             "  supine breathe lungs.safetensors --posture supine --tidal 800 -o deep.safetensors",
+    .notes =
+        "Examples:\n"
+        "  supine breathe lungs.safetensors --posture prone -o prone.vtp\n"
+        "  supine breathe lungs.safetensors --turn supine:left:10s --rate 15 -o turning.vtp\n"
+        "  supine breathe lungs.safetensors --posture supine --tidal 800mL -o deep.safetensors",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .begin = begin,

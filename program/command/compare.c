@@ -45,9 +45,9 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, comparison.volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, comparison.from)},
     {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
-    {"breath", 0, "ML", "tidal volume of the breath whose ventilation by height is computed",
+    {"breath", 0, "VOLUME", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, comparison.breath), SUPINE_SAYS_GIVEN(request, has_breath),
-     .standard = "500", SUPINE_ABOVE_ZERO},
+     .standard = "500mL", SUPINE_BREATH},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis: the report has the displacement of "
      "each, with its expected error",
@@ -146,7 +146,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_state *state = &c->volume.state;
   c->path = given->operand[0];
   c->made_by = given->made_by;
-  SUPINE_TRY(supine_options_basis_open(c->path, SUPINE_STORAGE_AUTO, &c->basis, error));
+  SUPINE_TRY(supine_options_basis_open(c->path, SUPINE_STORAGE_AUTO, c->volume.allow_folds,
+                                       &c->basis, error));
   const bool has_volume = state->lung_count > 0 || state->volume.kind != SUPINE_VOLUME_DEFAULT;
   state->gravity[1] = 1.0;
   if (supine_basis_get_info(c->basis)->is_fields && !wanted->has_breath) {

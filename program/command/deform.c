@@ -62,8 +62,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                               .subtract_hilum = wanted->frame == 1};
   char comment[192];
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
-  SUPINE_TRY(supine_options_pose(basis, name, wanted->volume.allow_folds, &moved.state, &moved.pose,
-                                 error));
+  SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
   SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
   SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
@@ -210,7 +209,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->volume.state, error));
     SUPINE_TRY(add_row(&b, error));
   }
-  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT, &b.basis, error));
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_EXACT,
+                                       wanted->volume.allow_folds, &b.basis, error));
   SUPINE_TRY(supine_command_deform_content_read(&wanted->content, name, error));
   for (size_t i = 0; i < b.count; ++i) {
     b.rows[i].content.source = wanted->content.source;

@@ -58,7 +58,7 @@ static const supine_option table[] = {
      "The "
      "grid reaches 60 mm past the lungs, or 1.5 times their largest displacement",
      SUPINE_FILLS(request, content.grid_spacing), SUPINE_SAYS_GIVEN(request, content.has_grid),
-     .standard = "4", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
+     .standard = "4", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
     {"labels", 0, "all|N[=NAME],...",
      "read images as label maps, and embed the surface of each label N as a part with this NAME; "
      "all of several maps, or of the folder of masks that TotalSegmentator writes (its lobes), "
@@ -172,7 +172,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    error, SUPINE_ERROR_ARGUMENT,
                    "a grid or an image cannot be embedded with other content: embed it alone, or "
                    "give --labels to embed the parts of a label map");
-  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
+  SUPINE_TRY(
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, true, &basis, error));
   return embed(basis, wanted, given, error);
 }
 

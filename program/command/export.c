@@ -11,6 +11,7 @@
 
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/breath_turn.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
 
@@ -21,6 +22,7 @@ typedef struct request {
   supine_from from;
   bool glb_only; /* whether an option was given that applies to .glb files only */
   bool breathes; /* whether --breath was given */
+  bool allow_folds;
   const char *inside;
   size_t simplify; /* 0 to keep all vertices */
   export_glb_options glb;
@@ -33,15 +35,16 @@ static const supine_option table[] = {
      "the lungs",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html or .glb"},
-    {"breath", 0, "ML",
+    {"breath", 0, "VOLUME",
      "tidal volume of the breath shown. Up to this volume, the weights of morph targets stay "
      "between 0 and 1",
-     SUPINE_FILLS(request, glb.breath), .standard = "500", SUPINE_ABOVE_ZERO,
-     SUPINE_SAYS_GIVEN(request, breathes), .wants = "millilitres above 0"},
+     SUPINE_FILLS(request, glb.breath), .standard = "500mL", SUPINE_BREATH,
+     SUPINE_SAYS_GIVEN(request, breathes)},
     {"simplify", 0, "N",
      "keep about N vertices, each with its own displacement, and span new triangles between them, "
      "for a smaller and faster file; the output says how far the new surface is from the whole one",
      SUPINE_FILLS(request, simplify), .range = {8, UINT32_MAX}},
+    {.table = supine_options_folds, SUPINE_FILLS(request, allow_folds)},
     {.help = "For a page:"},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis, shown inside transparent lungs; the "
@@ -157,6 +160,23 @@ static supine_status write_page(const supine_basis *basis, const request *wanted
   return SUPINE_OK;
 }
 
+/* Judge the lungs at both ends of the breath that is shown, in supine posture. */
+static supine_status judge_breath(const supine_basis *basis, double breath, supine_error *error) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
+  if (supine_basis_get_info(basis)->is_fields) {
+    return SUPINE_OK; /* the simulated volumes limit the breath */
+  }
+  for (int end = 0; end < 2; ++end) {
+    const supine_state state = supine_options_breath_state(basis, supine, end * breath);
+    supine_pose pose;
+    supine_error wrong;
+    if (supine_options_pose(basis, name, &state, &pose, &wrong) != SUPINE_OK) {
+      return supine_error_wrap(error, &wrong, "--breath: ");
+    }
+  }
+  return SUPINE_OK;
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   const char *path = given->operand[0];
@@ -174,7 +194,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_REFUSE_IF(!page && of_page != NULL, error, SUPINE_ERROR_ARGUMENT,
                    "%s needs an output that ends in .html", of_page);
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_EXACT, &basis, error));
+  SUPINE_TRY(
+      supine_options_basis_open(path, SUPINE_STORAGE_EXACT, wanted->allow_folds, &basis, error));
   SUPINE_REFUSE_IF(supine_basis_get_info(basis)->is_fields &&
                        supine_basis_get_info(basis)->order == 0 &&
                        (wanted->breathes || wanted->glb.animate),
@@ -182,6 +203,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    "%s holds another simulator's fields of gravity, which have no breaths: leave "
                    "--breath and --animate out",
                    path);
+  SUPINE_TRY(judge_breath(basis, wanted->glb.breath, error));
   return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
 }
 
@@ -204,7 +226,7 @@ const supine_command supine_command_export = {
              "  supine export lungs.safetensors -o lungs.html --from scan\n"
              "  supine export lungs.safetensors -o lungs.html --simplify 5000\n"
              "  supine export lungs.safetensors -o lungs.glb --animate\n"
-             "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000",
+             "  supine export lungs.safetensors -o lungs.glb --plain --breath 1000mL",
     SUPINE_ONE_BASIS,
     .request_size = sizeof(request),
     .run = run};

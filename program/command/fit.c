@@ -86,12 +86,13 @@ static const supine_option table[] = {
      "repeated, up to 8 times. A state in another posture determines how strongly the displacement "
      "depends on gravity (--gain of 'supine precompute'); for a state in the same posture, only "
      "the size of the displacement is fitted. All other constants come from the two scans",
-     .read = read_further, .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
+     .read = read_further, .repeats = true,
+     .wants = "STATE:FILE (at most 8 times), such as prone:rest:prone.ply"},
     {"midline", 0, "X",
      "x of the plane between the lungs, in mm and LPS; default the widest gap between landmarks "
      "near the middle",
-     FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline),
-     .wants = "a number of mm", .more = true},
+     FILLS(source.midline), SUPINE_SAYS_GIVEN(request, source.has_midline), SUPINE_MEASURES(LENGTH),
+     .more = true},
     {.table = supine_options_surface_frame, FILLS(source.load)},
     {"expandability", 0, NULL,
      "for surfaces: instead of kriging, fit the expandability (the inverse of the stiffness) of "

@@ -42,7 +42,7 @@ static const supine_option table[] = {
      "translation is fitted",
      SUPINE_FILLS(request, rigid)},
     {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
-     .standard = "2", SUPINE_ABOVE_ZERO, .wants = "millimetres"},
+     .standard = "2", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
     {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
@@ -202,7 +202,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (wanted->orientation.given) {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
-  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &lungs, error));
+  SUPINE_TRY(
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, false, &lungs, error));
   SUPINE_TRY(supine_options_inside_open(lungs, wanted->points, &inside, &names, error));
   SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
   const supine_locate_task task = {inside, observed.count, observed.points, wanted->state,

@@ -18,8 +18,8 @@ static const supine_option table[] = {
      .required = true, .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS},
     {"vertices", 0, "N", "approximate number of vertices of both lungs, up to 20 million",
      SUPINE_FILLS(request, vertices), .standard = "20000"},
-    {"volume", 0, "ML", "volume of both lungs at full inflation", SUPINE_FILLS(request, volume),
-     .standard = "6000", .wants = "millilitres"},
+    {"volume", 0, "VOLUME", "volume of both lungs at full inflation", SUPINE_FILLS(request, volume),
+     .standard = "6000mL", SUPINE_MEASURES(VOLUME)},
     {.name = NULL}};
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -31,8 +31,8 @@ static const supine_option table[] = {
      "JSON file of the parameters and the report, for --pv of 'supine breathe'",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
     {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
-    {"step", 's', "CMH2O", "for 'show': step of pressure, in cmH2O", SUPINE_FILLS(request, step),
-     .standard = "1", SUPINE_ABOVE_ZERO, .wants = "a positive number of cmH2O"},
+    {"step", 's', "CMH2O", "for 'show': step of pressure", SUPINE_FILLS(request, step),
+     .standard = "1", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(PRESSURE)},
     {.name = NULL}};
 
 static json_t *json_limb(const supine_pv_curve *curve, const supine_pv_report *report) {

@@ -86,7 +86,7 @@ static const supine_option table[] = {
     {"largest", 0, "MM",
      "with --look displacement, the end of the colour bar. If values exceed it, the bar has a "
      "pointed end. Default the largest displacement, rounded up",
-     FILLS(largest), SUPINE_ABOVE_ZERO, .wants = "millimetres above 0", .more = true},
+     FILLS(largest), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH), .more = true},
     {.name = NULL}};
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -69,7 +69,8 @@ static void close_studio(studio *s) {
 }
 
 static supine_status open_studio(studio *s, const char *path, supine_error *error) {
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &s->basis, error));
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, s->wanted->volume.allow_folds,
+                                       &s->basis, error));
   SUPINE_TRY(supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error));
   SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
   if (s->wanted->inside != NULL) {
@@ -88,8 +89,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
 static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
-  SUPINE_TRY(supine_options_pose(s->basis, name, s->wanted->volume.allow_folds, &item->state,
-                                 &shown->pose, error));
+  SUPINE_TRY(supine_options_pose(s->basis, name, &item->state, &shown->pose, error));
   supine_distance_statistics statistics;
   (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);

@@ -46,7 +46,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, session.points), .file = SUPINE_FILE_IN},
     {"noise", 0, "MM", "standard deviation of an observed coordinate",
      SUPINE_FILLS(request, session.noise), .standard = "2", SUPINE_ABOVE_ZERO,
-     .wants = "millimetres", .more = true},
+     SUPINE_MEASURES(LENGTH), .more = true},
     {.help = "Volume and breathing:"},
     {"volume", 0, "VOLUME",
      "fixed volume, instead of breathing: " SUPINE_VOLUME_HELP
@@ -54,13 +54,15 @@ static const supine_option table[] = {
      "NDARRAY of one number, in mL above rest",
      SUPINE_FILLS(request, session.volume), .read = supine_options_read_volume,
      SUPINE_SAYS_GIVEN(request, session.has_volume)},
-    {"tidal", 0, "ML", "tidal volume; default 500", SUPINE_FILLS(request, session.breath.tidal),
-     SUPINE_ABOVE_ZERO, SUPINE_SAYS_GIVEN(request, session.has_breath)},
+    {"tidal", 0, "VOLUME", "tidal volume; default 500mL",
+     SUPINE_FILLS(request, session.breath.tidal), SUPINE_BREATH,
+     SUPINE_SAYS_GIVEN(request, session.has_breath)},
     {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, session.breath.rate),
-     SUPINE_ABOVE_ZERO, SUPINE_SAYS_GIVEN(request, session.has_breath)},
+     SUPINE_ABOVE_ZERO, SUPINE_MEASURES(RATE), SUPINE_SAYS_GIVEN(request, session.has_breath)},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
      SUPINE_FILLS(request, session.pv), .file = SUPINE_FILE_IN,
      SUPINE_SAYS_GIVEN(request, session.has_breath), .more = true},
+    {.table = supine_options_folds, SUPINE_FILLS(request, session.allow_folds)},
     {.help = "Output:"},
     {"send", 0, "WHAT",
      "what a peer receives\nweights: an NDARRAY with a weight for each mode, then three factors "
@@ -94,8 +96,9 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, session.certificate), .file = SUPINE_FILE_IN, .more = true},
     {"key", 0, "PEM", "the certificate's private key", SUPINE_FILLS(request, session.key),
      .file = SUPINE_FILE_IN, .more = true},
-    {"seconds", 0, "S", "duration of the run in s; default until interrupted",
-     SUPINE_FILLS(request, session.options.seconds), SUPINE_ABOVE_ZERO, .more = true},
+    {"seconds", 0, "S", "duration of the run; default until interrupted",
+     SUPINE_FILLS(request, session.options.seconds), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(TIME),
+     .more = true},
     {.name = NULL}};
 
 static void begin(void *chosen) {
@@ -132,7 +135,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    "--world-down or --body-from-tracker is zero: give a direction, such as 0,0,-1, "
                    "and a quaternion, such as 1,0,0,0");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, &basis, error));
+  SUPINE_TRY(supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, session->allow_folds,
+                                       &basis, error));
   return supine_command_stream_run(session, basis, error);
 }
 

@@ -36,7 +36,7 @@ static void report(const supine_stream_results *results, const supine_stream_ses
   }
   if (n->malformed + n->skipped + n->lost + n->idle + n->turned_away + n->unreachable > 0) {
     (void)printf("malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; peers "
-                 "refused: %zu; frames whose volume is out of reach: %zu\n",
+                 "refused: %zu; volumes refused: %zu\n",
                  n->malformed, n->skipped, n->lost + n->idle, n->turned_away, n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
@@ -162,10 +162,12 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
   return SUPINE_OK;
 }
 
-/* Choose a breath, or a fixed volume. Fields of gravity have no breaths. Fields of gravity and
- * volume breathe if it is asked, or if the volume at rest is known. */
+/* Choose a breath, or a fixed volume, and judge it in supine posture. Fields of gravity have no
+ * breaths. Fields of gravity and volume breathe if it is asked, or if the volume at rest is known.
+ */
 static supine_status set_volume(const supine_basis *basis, const supine_stream_session *wanted,
                                 supine_stream_volume *volume, supine_error *error) {
+  static const double supine[3] = {0.0, 1.0, 0.0};
   supine_pv pv = *supine_breath_normal();
   const supine_basis_info *info = supine_basis_get_info(basis);
   const bool breathes =
@@ -173,25 +175,15 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
   SUPINE_REFUSE_IF(
       wanted->has_breath && !breathes, error, SUPINE_ERROR_ARGUMENT,
       "the basis was made with --fields and has no breaths: leave out --tidal, --rate and --pv");
-  SUPINE_REFUSE_IF(wanted->has_volume && info->hilum != NULL && wanted->volume.lung_count == 0 &&
-                       wanted->volume.volume.kind == SUPINE_VOLUME_SCAN &&
-                       wanted->volume.volume.ml == 0.0,
-                   error, SUPINE_ERROR_UNSUPPORTED,
-                   "--volume scan: that is the lungs before their collapse: give another volume");
-  if (info->is_fields && (wanted->has_volume || !breathes)) {
-    supine_pose pose;
+  if (wanted->has_volume || !breathes) {
     volume->fixed = wanted->volume;
-    volume->fixed.gravity[1] = 1.0;
-    return supine_basis_pose(basis, &volume->fixed, &pose, error);
+  } else {
+    if (wanted->pv != NULL) {
+      SUPINE_TRY(supine_options_pv_load(wanted->pv, &pv, error));
+    }
+    SUPINE_TRY(supine_stream_volume_breathe(volume, &pv, &wanted->breath, error));
   }
-  if (wanted->has_volume) {
-    volume->fixed = wanted->volume;
-    return SUPINE_OK;
-  }
-  if (wanted->pv != NULL) {
-    SUPINE_TRY(supine_options_pv_load(wanted->pv, &pv, error));
-  }
-  return supine_stream_volume_breathe(volume, &pv, &wanted->breath, error);
+  return supine_stream_volume_judge(volume, basis, supine, error);
 }
 
 /* What a run needs besides the basis. */

@@ -11,6 +11,7 @@ typedef struct supine_stream_session {
   supine_stream_options options; /* without volume, observed points, page and callbacks */
   supine_state volume;           /* fixed volume, if `has_volume` */
   bool has_volume, has_breath;   /* whether options of the volume or of the breath are given */
+  bool allow_folds;              /* whether states that lungs cannot hold are allowed */
   const char *pv;                /* file of the pressure-volume relation, or NULL */
   supine_pv_breath breath;
   const char *web, *certificate, *key; /* address and encryption of the page; NULL if not given */

@@ -61,7 +61,7 @@ static const supine_option table[] = {
     {"state", 0, "[POSTURE[:VOLUME]:]SURFACE",
      "surface of the same lungs in another state; its mesh may differ from that of the basis. May "
      "be repeated, up to 8 times. The second points of landmarks are in the first --state",
-     .read = append_state,
+     .read = append_state, .repeats = true,
      .wants = "SURFACE, POSTURE:SURFACE or POSTURE:VOLUME:SURFACE (at most 8 times)"},
     {.table = supine_options_landmarks, FILLS(landmarks)},
     {"from", 0, "POSTURE[:VOLUME]",
@@ -180,7 +180,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    path);
   s.moved = supine_options_scan_motion(&wanted->landmarks);
   set_states(wanted, &s);
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, &basis, error));
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, true, &basis, error));
   s.basis = basis;
   SUPINE_TRY(supine_validation_begin(&s, error));
   SUPINE_TRY(validate(wanted, &s, error));

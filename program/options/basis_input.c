@@ -17,10 +17,10 @@ void supine_options_basis_close(supine_basis **basis) {
   supine_basis_close(*basis);
 }
 
-supine_status supine_options_basis_open(const char *path, supine_storage storage,
+supine_status supine_options_basis_open(const char *path, supine_storage storage, bool allow_folds,
                                         supine_basis **basis, supine_error *error) {
   const supine_basis_options options = {sizeof options, .storage = storage, .without_normals = true,
-                                        .allow_folds = true}; /* commands check states themselves */
+                                        .allow_folds = allow_folds};
   SUPINE_TRY(supine_basis_open_with(path, &options, basis, error));
   SUPINE_REFUSE_IF(
       !supine_basis_get_info(*basis)->has_volume, error, SUPINE_ERROR_OPEN_SURFACE,

@@ -17,8 +17,9 @@
 extern const supine_option supine_options_as_scanned[];
 
 /* Open a basis without its stored normals, and check that its surface is closed. The caller must
- * close the basis even after a failure. */
-supine_status supine_options_basis_open(const char *path, supine_storage storage,
+ * close the basis even after a failure.
+ * @param allow_folds  as supine_basis_options.allow_folds: --allow-folds */
+supine_status supine_options_basis_open(const char *path, supine_storage storage, bool allow_folds,
                                         supine_basis **basis, supine_error *error);
 
 /* Close *basis; for SUPINE_FREED_BY. */

@@ -47,12 +47,9 @@ supine_status supine_options_turn_read(const char *text, void *turn, supine_erro
   if (sscanf(text, "%47[^:]:%47[^:]:%31s", from, to, seconds) != 3) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  char *unit = &seconds[strlen(seconds) - 1];
-  if (*unit == 's') {
-    *unit = '\0';
-  }
-  const bool is_number = supine_options_parse_number(seconds, &made->seconds);
-  SUPINE_REFUSE_IF(!is_number || !(made->seconds > 0.0), error, SUPINE_ERROR_ARGUMENT,
+  const supine_status status =
+      supine_quantity_parse(seconds, SUPINE_QUANTITY_TIME, 1, &made->seconds, NULL);
+  SUPINE_REFUSE_IF(status != SUPINE_OK || !(made->seconds > 0.0), error, SUPINE_ERROR_ARGUMENT,
                    "'%s': the time must be above 0 s, as in supine:left:5s", text);
   supine_state state[2] = {{.lung_count = 0}};
   SUPINE_TRY(supine_state_parse_posture(from, &state[0], error));

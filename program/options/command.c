@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Report errors and progress, read numbers, suggest names, and handle interrupts. */
 #include <errno.h>
-#include <math.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -13,6 +12,7 @@
 #include "base/clock.h"
 #include "base/number.h"
 #include "base/output.h"
+#include "base/quantity.h"
 #include "base/utf8.h"
 
 #include "program/options/command.h"
@@ -26,6 +26,7 @@ void supine_options_say(const char *command, const char *format, ...) {
   va_start(arguments, format);
   (void)supine_print_text_list(text, sizeof text, format, arguments);
   va_end(arguments);
+  supine_number_shorten(text);
   supine_utf8_escape(text, "\n", printable, sizeof printable);
   (void)fprintf(stderr, "supine %s: %s\n", command, printable);
 }
@@ -44,16 +45,7 @@ bool supine_options_parse_number(const char *text, double *value) {
 }
 
 bool supine_options_parse_numbers(const char *text, size_t count, double *values) {
-  const char *at = text;
-  for (size_t i = 0; i < count; ++i) {
-    char *end = NULL;
-    values[i] = supine_number_parse(at, &end);
-    if (end == at || !isfinite(values[i]) || *end != (i + 1 < count ? ',' : '\0')) {
-      return false;
-    }
-    at = end + 1;
-  }
-  return true;
+  return supine_quantity_parse(text, SUPINE_QUANTITY_NUMBER, count, values, NULL) == SUPINE_OK;
 }
 
 bool supine_options_parse_count(const char *text, size_t *value) {

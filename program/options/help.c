@@ -87,9 +87,10 @@ static void print_row(void *context, const supine_option *option, size_t base) {
                            option->argument != NULL ? option->argument : "");
   const bool beside = used + 2 <= TEXT_COLUMN;
   (void)fprintf(file, "%s%*s", beside ? "" : "\n", beside ? TEXT_COLUMN - used : TEXT_COLUMN, "");
-  (void)snprintf(text, sizeof text, "%s%s%s", option->help,
-                 option->standard != NULL ? "; default " : "",
-                 option->standard != NULL ? option->standard : "");
+  const char *units = supine_quantity_units(option->quantity);
+  (void)snprintf(
+      text, sizeof text, "%s%s%s%s%s", option->help, option->standard != NULL ? "; default " : "",
+      option->standard != NULL ? option->standard : "", units[0] != '\0' ? ". Units: " : "", units);
   print_text(text, TEXT_COLUMN, TEXT_COLUMN, file);
 }
 

@@ -11,6 +11,7 @@
 
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
+#include "runtime/checks.h"
 
 /* Sort the vertices by structure, then in input order. */
 static supine_status sort_by_name(supine_options_names *names, size_t n, supine_error *error) {
@@ -100,7 +101,8 @@ size_t supine_options_lung_of(const supine_basis_info *info, size_t vertex) {
 supine_status supine_options_inside_open(const supine_basis *lungs, const char *path,
                                          supine_basis **inside, supine_options_names *names,
                                          supine_error *error) {
-  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, inside, error));
+  SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, supine_basis_allows_folds(lungs),
+                                       inside, error));
   SUPINE_TRY(supine_options_names_open(*inside, names, error));
   const supine_basis_info *info = supine_basis_get_info(*inside);
   SUPINE_REFUSE_IF(

@@ -82,10 +82,17 @@ static supine_status read_expandability(const char *text, void *field, supine_er
 
 static supine_status read_lesion(const char *text, void *field, supine_error *error) {
   supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
-  (void)error;
+  const char *factor = strrchr(text, ',');
+  char lengths[128];
   double v[5];
-  if (tissue->lesion_count == SUPINE_PRECOMPUTE_LESIONS_MAX ||
-      !supine_options_parse_numbers(text, 5, v) || !(v[3] > 0.0) || !(v[4] > 0.0)) {
+  if (tissue->lesion_count == SUPINE_PRECOMPUTE_LESIONS_MAX || factor == NULL ||
+      (size_t)(factor - text) >= sizeof lengths ||
+      !supine_options_parse_number(factor + 1, &v[4])) {
+    return SUPINE_ERROR_ARGUMENT;
+  }
+  (void)snprintf(lengths, sizeof lengths, "%.*s", (int)(factor - text), text);
+  SUPINE_TRY(supine_quantity_parse(lengths, SUPINE_QUANTITY_LENGTH, 4, v, error));
+  if (!(v[3] > 0.0) || !(v[4] > 0.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
   tissue->lesions[tissue->lesion_count++] =
@@ -96,7 +103,6 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
 /* Read a collapsed lung and the share of its volume that remains, such as "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
-  (void)error;
   const bool left = strncmp(text, "left:", strlen("left:")) == 0;
   double share;
   if (!(left || strncmp(text, "right:", strlen("right:")) == 0) ||
@@ -104,6 +110,8 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
       !(share > 0.0 && share <= 1.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
+  SUPINE_REFUSE_IF(tissue->share[left ? 0 : 1] != 0.0, error, SUPINE_ERROR_ARGUMENT,
+                   "the %s lung is given twice: give it once", left ? "left" : "right");
   tissue->share[left ? 0 : 1] = share;
   return SUPINE_OK;
 }
@@ -128,8 +136,8 @@ const supine_option supine_options_model[] = {
     {"midline", 0, "X",
      "x of the sagittal plane between the lungs, in mm and LPS; default the middle of the bounding "
      "box of two lungs, or the medial side of a single lung",
-     FILLS(precompute.lungs.midline), GIVEN(precompute.lungs.has_midline),
-     .wants = "a number of mm", .more = true},
+     FILLS(precompute.lungs.midline), GIVEN(precompute.lungs.has_midline), SUPINE_MEASURES(LENGTH),
+     .more = true},
     {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
              "file, or the folder of masks that TotalSegmentator writes:"},
     {"labels", 0, "WHICH",
@@ -139,10 +147,10 @@ const supine_option supine_options_model[] = {
      "one lung. By default, the labels in the map decide, if they are unambiguous",
      FILLS(precompute.lungs.labels)},
     {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
-     FILLS(precompute.lungs.edge), .range = {0.2, 20.0}, .wants = "0.2 to 20 mm", .more = true},
+     FILLS(precompute.lungs.edge), .range = {0.2, 20.0}, SUPINE_MEASURES(LENGTH), .more = true},
     {"close", 0, "MM",
      "close gaps and channels narrower than twice MM, which vessels leave in masks; default 0",
-     FILLS(precompute.lungs.close), .range = {0.0, 20.0}, .wants = "0 to 20 mm"},
+     FILLS(precompute.lungs.close), .range = {0.0, 20.0}, SUPINE_MEASURES(LENGTH)},
     {"surfaces-out", 0, "FILE", "also write the surfaces: " SUPINE_MESH_ENDINGS,
      FILLS(precompute.lungs.surfaces_out), .file = SUPINE_FILE_OUT, .endings = SUPINE_MESH_ENDINGS,
      .more = true},
@@ -176,8 +184,7 @@ const supine_option supine_options_model[] = {
      "height of the patient. Height and --sex give the volume expected at TLC (ECSC 1993, less 10 "
      "% for lying, plus 0.86 L of tissue), which is printed beside the volume of the scan. Without "
      "them, the range of adults is printed",
-     FILLS(precompute.volumes.height), .range = {50.0, 250.0}, .wants = "50 to 250 cm",
-     .more = true},
+     FILLS(precompute.volumes.height), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(HEIGHT), .more = true},
     {"sex", 0, "SEX", "female or male", FILLS(precompute.volumes.sex),
      .choices = supine_precompute_sexes, .more = true},
     {.help = "Law of motion. The force on a vertex is base + gain h + cx X + cy Y + cz Z. The "
@@ -215,8 +222,7 @@ const supine_option supine_options_model[] = {
      "distance over which a force spreads along the surface: the force falls with the distance r "
      "about as exp(-r/MM). Without --reach, the paper law spreads it over a few edges of the mesh; "
      "in a finer mesh edges are shorter, and its surface may fold. Default 10 for deep",
-     FILLS(precompute.law.reach), SUPINE_ABOVE_ZERO, .wants = "a length in mm above 0",
-     .more = true},
+     FILLS(precompute.law.reach), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH), .more = true},
     {.help = "Tissue. Expandability is the inverse of stiffness. Only its ratios between parts of "
              "the lungs count: doubling it everywhere changes nothing."},
     {"expandability", 0, "WHAT",
@@ -234,12 +240,14 @@ const supine_option supine_options_model[] = {
      "lesion with its centre at X,Y,Z (mm, LPS). Within half of RADIUS (mm), the stiffness is "
      "multiplied by FACTOR; from there to RADIUS the multiplier changes smoothly to 1. A FACTOR "
      "above 1 stiffens the tissue, which then strains less. May be repeated, up to 64 times",
-     .read = read_lesion, .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
+     .read = read_lesion, .repeats = true,
+     .wants = "X,Y,Z,RADIUS,FACTOR, the last two above 0 (at most 64 times)"},
     {"lung", 0, "SIDE:SHARE",
      "collapsed lung (pneumothorax), left or right: SHARE, above 0 and at most 1, multiplies its "
      "volume in every state but the scan, which stays as it was scanned. The lung shrinks towards "
      "its hilum. The other lung takes the rest of each breath",
-     .read = read_lung, .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
+     .read = read_lung, .repeats = true,
+     .wants = "left:SHARE or right:SHARE, above 0 and at most 1"},
     {.name = NULL}};
 
 static void print_map(const char *path, const supine_source *source) {

@@ -74,11 +74,11 @@ static supine_status read_value(const supine_option *option, const char *text, v
     *(bool *)field = true;
     return SUPINE_OK;
   case SUPINE_OPTION_NUMBER:
-    return supine_options_fits(supine_options_parse_number(text, field) &&
-                               within(option, *(double *)field));
+    SUPINE_TRY(supine_quantity_parse(text, option->quantity, 1, field, error));
+    return supine_options_fits(within(option, *(double *)field));
   case SUPINE_OPTION_NUMBERS:
-    return supine_options_fits(
-        supine_options_parse_numbers(text, option->size / sizeof(double), field));
+    return supine_quantity_parse(text, option->quantity, option->size / sizeof(double), field,
+                                 error);
   case SUPINE_OPTION_COUNT:
     return supine_options_fits(supine_options_parse_count(text, field) &&
                                within(option, (double)*(size_t *)field));
@@ -106,7 +106,12 @@ static void describe_valid_values(const supine_option *option, char *text, size_
       used += (size_t)snprintf(text + used, size - used, "%s%s", before, option->choices[i]);
     }
   } else if (option->range[1] > 0.0 && !option->open) {
-    (void)supine_print_text(text, size, "%g to %g", option->range[0], option->range[1]);
+    const char *units = supine_quantity_units(option->quantity);
+    (void)supine_print_text(text, size, "%g to %g%s%.*s", option->range[0], option->range[1],
+                            units[0] != '\0' ? " " : "", (int)strcspn(units, ", "), units);
+  } else if (option->quantity != SUPINE_QUANTITY_NUMBER) {
+    (void)snprintf(text, size, "a number%s, in %s", option->open ? " above 0" : "",
+                   supine_quantity_units(option->quantity));
   } else {
     const char *wants = option->open ? "a number above 0" : "a number";
     if (option->kind == SUPINE_OPTION_COUNT) {
@@ -140,14 +145,14 @@ static supine_status read_given(reading *r, row *target, const char *text, supin
                    (int)strcspn(option->endings, ", "), option->endings);
     text = r->standard_output;
   }
+  SUPINE_REFUSE_IF(target->given && option->argument != NULL && !option->repeats, error,
+                   SUPINE_ERROR_ARGUMENT, "give --%s once", option->name);
   if (option->rivals != NULL) {
     for (size_t i = 0; i < r->count; ++i) {
       const supine_option *other = r->rows[i].option;
       if (r->rows[i].given && other->rivals != NULL && strcmp(other->rivals, option->rivals) == 0) {
-        return other == option
-                   ? supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s once", option->name)
-                   : supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s or --%s, not both",
-                                      other->name, option->name);
+        return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "give --%s or --%s, not both",
+                                other->name, option->name);
       }
     }
   }

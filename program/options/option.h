@@ -13,12 +13,14 @@
 
 #include <supine/status.h>
 
+#include "base/quantity.h"
+
 /* Type of an option's value; SUPINE_FILLS derives it from the C type of the member that the option
  * sets. */
 typedef enum supine_option_kind {
   SUPINE_OPTION_OWN,     /* any other type, for which the option must set `read` */
   SUPINE_OPTION_FLAG,    /* bool, without a value: true if the option is given */
-  SUPINE_OPTION_NUMBER,  /* double: a finite number within the option's `range` */
+  SUPINE_OPTION_NUMBER,  /* double: a finite number within the option's `range`, with a unit */
   SUPINE_OPTION_NUMBERS, /* double[n]: n numbers separated by commas */
   SUPINE_OPTION_COUNT,   /* size_t: a whole number within the option's `range` */
   SUPINE_OPTION_TEXT,    /* const char *: the argument itself, which lives as long as argv */
@@ -53,14 +55,16 @@ typedef struct supine_option {
   size_t offset, size; /* offset and size of the struct member that the option sets, bytes */
   size_t given;        /* 1 + offset of a bool member that is set if the option is given; 0: none */
   supine_option_reader *read;
-  const char *standard; /* default, as the user would write it; NULL if none */
-  double range[2];      /* limits of numbers and counts; {0, 0} if there are none */
-  bool open;            /* true if values equal to a limit are invalid */
-  const char *wants;    /* description of valid values; NULL to derive it from kind and range */
+  const char *standard;     /* default, as the user would write it; NULL if none */
+  double range[2];          /* limits of numbers and counts; {0, 0} if there are none */
+  bool open;                /* true if values equal to a limit are invalid */
+  supine_quantity quantity; /* what a number measures; its unit is that of the quantity */
+  const char *wants;        /* description of valid values; NULL to derive it from kind and range */
   const char *const *choices; /* valid words, then NULL; if `read` is set, for completion only */
   const char *rivals;         /* name of a group of which the user may give one option, once */
   const char *partners; /* names of the only options that may be given with this one; NULL: any */
   bool alone;           /* given without operands and without required options */
+  bool repeats;         /* may be given several times; any other option with a value only once */
   bool required;
   bool more; /* shown by --help-all only */
   supine_option_file file;
@@ -82,6 +86,7 @@ typedef struct supine_option {
   .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
 #define SUPINE_SAYS_GIVEN(type, member) .given = (1 + offsetof(type, member))
 #define SUPINE_ABOVE_ZERO .range = {0.0, INFINITY}, .open = true
+#define SUPINE_MEASURES(quantity_) .quantity = SUPINE_QUANTITY_##quantity_
 
 /* Operands of a command, and the command line. */
 typedef struct supine_arguments {

@@ -10,6 +10,7 @@ static const char *const words_of[] = {
     [SUPINE_REMEDY_NONE] = "",
     [SUPINE_REMEDY_BASIS_WITH_REST] =
         ", or make the basis again, without --scanned none and --law paper",
+    [SUPINE_REMEDY_ALLOW_FOLDS] = ", or accept this with --allow-folds",
     [SUPINE_REMEDY_LOCATE_VOLUME] = ", or give --volume",
     [SUPINE_REMEDY_AXES] = "; give the axes, for example --axes {}",
     [SUPINE_REMEDY_AXES_ADD] = ": add --axes {}",

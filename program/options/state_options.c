@@ -94,6 +94,17 @@ supine_status supine_options_read_volume(const char *text, void *field, supine_e
   return supine_state_parse_volume(text, field, error);
 }
 
+supine_status supine_options_read_breath(const char *text, void *field, supine_error *error) {
+  double ml = 0.0;
+  SUPINE_TRY(supine_quantity_parse(text, SUPINE_QUANTITY_VOLUME, 1, &ml, error));
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_BREATH_LEAST, ml);
+  SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_ARGUMENT,
+                   "'%s' is no breath: give %gmL or more, such as 500mL", text,
+                   supine_input_get(SUPINE_INPUT_BREATH_LEAST)->refused);
+  *(double *)field = ml;
+  return SUPINE_OK;
+}
+
 const supine_option supine_options_folds[] = {
     {"allow-folds", 0, NULL,
      "allow volumes below 10 % or above 120 % of full inflation, surfaces with more than 1 % of "
@@ -204,41 +215,34 @@ supine_status supine_options_plausible(const supine_plausible *lungs, supine_err
   return refuse_or_warn(lungs->command, lungs->state, wrong, lungs->allowed, error);
 }
 
-supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
-                                        bool allow_folds, const supine_state *state,
-                                        const supine_pose *pose, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const bool law = info->has_rest && !info->is_fields; /* which fields fold, a simulator decides */
-  char wrong[256];
-  if (supine_basis_has_range_of_volumes(basis)) {
-    if (supine_basis_can_hold(basis, state, pose, wrong, sizeof wrong)) {
-      return SUPINE_OK;
-    }
-    return refuse_or_warn(command, state, wrong, allow_folds, error);
-  }
+/* Warn if more than the share of the check `folds` of the triangles of a pose turn over. */
+static supine_status tell_folds(const supine_basis *basis, const char *command,
+                                const supine_state *state, const supine_pose *pose,
+                                supine_error *error) {
   supine_plausible lungs = {.command = command,
                             .state = state,
-                            .volume = supine_posed_volume(basis, pose),
                             .parts = "the surface folds; triangles that turn over",
-                            .allowed = allow_folds || !law};
+                            .allowed = true};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh mesh = {0};
   SUPINE_FREED_BY(supine_mesh_free) supine_mesh moved = {0};
   SUPINE_TRY(supine_posed_mesh(basis, NULL, &mesh, error));
   SUPINE_TRY(supine_posed_mesh(basis, pose, &moved, error));
   lungs.folded = supine_mesh_turned_over(&mesh, moved.vertices);
-  if (law) {
-    for (size_t lung = 0; lung < info->lung_count; ++lung) {
-      lungs.full += info->reference_volume[lung];
-    }
-  }
   return supine_options_plausible(&lungs, error);
 }
 
-supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
+supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error) {
+  supine_error allowed;
   SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
-  return supine_options_pose_check(basis, command, allow_folds, state, pose, error);
+  if (!supine_basis_has_range_of_volumes(basis)) {
+    return tell_folds(basis, command, state, pose, error);
+  }
+  if (supine_basis_check(basis, state, pose, &allowed) != SUPINE_OK) {
+    supine_options_say(command, "warning: %s", allowed.message);
+  }
+  return SUPINE_OK;
 }
 
 /* The logarithm of an assumed volume has a normal distribution, so that its range, one standard

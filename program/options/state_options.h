@@ -62,6 +62,12 @@ extern const supine_option supine_options_volume[];
 /* Read the value of --volume into a supine_state. */
 supine_status supine_options_read_volume(const char *text, void *field, supine_error *error);
 
+/* Read the tidal volume of a breath, mL, and judge it by the check `breath-least`. */
+supine_status supine_options_read_breath(const char *text, void *field, supine_error *error);
+
+/* Members of an option of a tidal volume. */
+#define SUPINE_BREATH .read = supine_options_read_breath, SUPINE_MEASURES(VOLUME)
+
 /* Option table that holds only --allow-folds, which sets a bool. */
 extern const supine_option supine_options_folds[];
 
@@ -113,15 +119,9 @@ typedef struct supine_plausible {
  * over. */
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error);
 
-/* Check the surface of a pose with supine_options_plausible. If the volume at rest is unknown, the
- * volume is not checked, and folds cause only a warning. */
-supine_status supine_options_pose_check(const supine_basis *basis, const char *command,
-                                        bool allow_folds, const supine_state *state,
-                                        const supine_pose *pose, supine_error *error);
-
-/* Compute the pose of a state, and check it. Statuses as supine_basis_pose and
- * supine_options_pose_check. */
-supine_status supine_options_pose(const supine_basis *basis, const char *command, bool allow_folds,
+/* Compute the pose of a state, which supine_basis_pose judges. Warn of a state that the basis was
+ * opened to allow and, if the basis does not say which volumes its lungs can hold, of folds. */
+supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error);
 

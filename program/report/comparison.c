@@ -47,12 +47,10 @@ static supine_status find_breath(const supine_comparison *c, float *xyz[2],
     state.volume.ml += posture->volume[lung];
   }
   supine_error wrong;
-  supine_status status = supine_basis_pose(c->basis, &state, &after, &wrong);
+  supine_status status = supine_options_pose(c->basis, command, &state, &after, &wrong);
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &wrong, "%s: ", item->name);
   }
-  SUPINE_TRY(
-      supine_options_pose_check(c->basis, command, c->volume.allow_folds, &state, &after, error));
   tell_end_of_breath(c, item->name, state.volume.ml);
   (void)supine_basis_volumes(c->basis, &after, posture->gain);
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
@@ -75,7 +73,8 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
                                   supine_compared_posture *posture, supine_error *error) {
   const supine_posture_item *item = posture->item;
   supine_error wrong;
-  supine_status status = supine_basis_pose(c->basis, &item->state, &posture->pose, &wrong);
+  supine_status status =
+      supine_options_pose(c->basis, command, &item->state, &posture->pose, &wrong);
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &wrong, "%s: ", item->name);
   }
@@ -84,9 +83,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
   (void)supine_options_hilum(c->basis, &item->state, &c->reference.state, false, &posture->hilum,
                              NULL);
-  status = supine_options_pose_check(c->basis, command, c->volume.allow_folds, &item->state,
-                                     &posture->pose, error);
-  if (status == SUPINE_OK && c->breath > 0.0) {
+  if (c->breath > 0.0) {
     status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
     if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */

@@ -72,6 +72,21 @@ size_t supine_stream_attribute_head(size_t points, unsigned char *bytes) {
   return SUPINE_STREAM_ATTRIBUTE;
 }
 
+size_t supine_stream_status_write(const char *device, const char *text, unsigned char *bytes) {
+  enum { UNREACHABLE = 8, NAME_AT = 10, TEXT_AT = 30 };
+  unsigned char *body = bytes + SUPINE_STREAM_HEADER;
+  supine_stream_header header = {.version = 1, .type = "STATUS"};
+  memset(body, 0, TEXT_AT);
+  put(body, 2, UNREACHABLE);
+  memcpy(body + NAME_AT, "refused", strlen("refused"));
+  (void)snprintf((char *)body + TEXT_AT, SUPINE_STREAM_STATUS_TEXT, "%s", text);
+  (void)snprintf(header.device, sizeof header.device, "%s", device);
+  header.size = TEXT_AT + strlen((char *)body + TEXT_AT) + 1;
+  header.crc = supine_stream_crc64(0, body, header.size);
+  supine_stream_header_write(&header, bytes);
+  return SUPINE_STREAM_HEADER + header.size;
+}
+
 SUPINE_CLONES void supine_stream_encode_floats(size_t count, float *values) {
   for (size_t i = 0; i < count; ++i) {
     uint32_t word;

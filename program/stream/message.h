@@ -96,6 +96,18 @@ supine_status supine_stream_message_read(const supine_stream_header *header,
 size_t supine_stream_polydata_head(size_t points, size_t strips, size_t size, size_t attributes,
                                    unsigned char *bytes);
 
+enum {
+  SUPINE_STREAM_STATUS_TEXT = 400, /* longest text of a STATUS, bytes with its NUL */
+  SUPINE_STREAM_STATUS_MAX = SUPINE_STREAM_HEADER + 30 + SUPINE_STREAM_STATUS_TEXT
+};
+
+/** Write a STATUS with the code 8, "can't be reached", and return its size. Its body has the code
+ * (2), a subcode of 0 (8), the name "refused" of the error (20), and the text with a NUL.
+ * @param device  device name of the message, up to 20 characters
+ * @param text    cut off after SUPINE_STREAM_STATUS_TEXT - 1 bytes
+ * @param bytes   [SUPINE_STREAM_STATUS_MAX] written */
+size_t supine_stream_status_write(const char *device, const char *text, unsigned char *bytes);
+
 enum { SUPINE_STREAM_ATTRIBUTE = 24 /* size of the head of an attribute of a POLYDATA, bytes */ };
 
 /** Write the head of the attribute "expected_error_mm", which precedes one float for each point;

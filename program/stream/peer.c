@@ -114,6 +114,31 @@ bool supine_stream_peer_ready(const supine_stream_peer *peer) {
 #endif
 }
 
+void supine_stream_peer_tell(supine_stream_peer *peer, const char *device, const char *text) {
+  if (!supine_stream_peer_has_status(peer)) {
+    peer->status_size = supine_stream_status_write(device, text, peer->status);
+    peer->status_sent = 0;
+  }
+}
+
+bool supine_stream_peer_has_status(const supine_stream_peer *peer) {
+  return peer->status_sent < peer->status_size;
+}
+
+supine_stream_outcome supine_stream_peer_send_status(supine_stream_peer *peer) {
+  if (peer->connecting || peer->frame != NULL || !supine_stream_peer_has_status(peer)) {
+    return SUPINE_STREAM_DONE;
+  }
+  const ssize_t sent = send(peer->socket, peer->status + peer->status_sent,
+                            peer->status_size - peer->status_sent, MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent < 0) {
+    return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? SUPINE_STREAM_MORE
+                                                                     : SUPINE_STREAM_LOST;
+  }
+  peer->status_sent += (size_t)sent;
+  return supine_stream_peer_has_status(peer) ? SUPINE_STREAM_MORE : SUPINE_STREAM_DONE;
+}
+
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,
                              supine_stream_frame *frame) {
   const bool triangles = peer->content == SUPINE_STREAM_SURFACE ||

@@ -53,6 +53,9 @@ typedef struct supine_stream_peer {
   uint64_t last_frame;  /**< serial number of the last frame given to the peer */
   supine_stream_frame *frame;  /**< frame being sent; NULL if none */
   supine_stream_packet packet; /**< unsent part of the message of `frame` */
+  /** Message that says why one from the peer is refused, and how much of it is sent, bytes. */
+  unsigned char status[SUPINE_STREAM_STATUS_MAX];
+  size_t status_size, status_sent;
 } supine_stream_peer;
 
 typedef enum supine_stream_outcome {
@@ -83,6 +86,18 @@ supine_stream_outcome supine_stream_peer_read(supine_stream_peer *peer, double n
 
 /** Return whether the kernel has sent all bytes of earlier frames. */
 bool supine_stream_peer_ready(const supine_stream_peer *peer);
+
+/** Prepare a STATUS that tells the peer why its message is refused, unless an earlier one is
+ * unsent.
+ * @param device  device name of the message */
+void supine_stream_peer_tell(supine_stream_peer *peer, const char *device, const char *text);
+
+/** Return whether a part of a STATUS is unsent. */
+bool supine_stream_peer_has_status(const supine_stream_peer *peer);
+
+/** Send what the socket's buffer accepts of a STATUS, if there is one and no frame is being sent.
+ */
+supine_stream_outcome supine_stream_peer_send_status(supine_stream_peer *peer);
 
 /** Prepare the message of a frame for supine_stream_peer_send. */
 void supine_stream_peer_give(supine_stream_peer *peer, supine_stream_frames *frames,

@@ -159,8 +159,12 @@ static void receive(void *context, supine_stream_peer *peer) {
   /* If poll() waited, the message has just arrived. Otherwise it may have arrived at any time
    * since the socket was last empty. */
   const bool poll_waited = s->woke - s->wait_begun > 50e-6;
-  supine_stream_patient_receive(&s->patient, &message, poll_waited ? s->woke : peer->emptied,
-                                peer->header.stamp);
+  if (supine_stream_patient_receive(&s->patient, &message, poll_waited ? s->woke : peer->emptied,
+                                    peer->header.stamp, &error) != SUPINE_OK) {
+    const supine_explained why = supine_options_explain(&error);
+    supine_stream_patient_warn(&s->patient, s->woke, "%s", why.text);
+    supine_stream_peer_tell(peer, s->options->name, why.text);
+  }
 }
 
 static void read_peer(supine_stream_server *s, supine_stream_peer *peer) {
@@ -215,6 +219,13 @@ static void add_latency(supine_stream_latency *latency, double seconds) {
 
 /* Send the unsent rest of a frame to a peer. If there is none, send the newest frame. */
 static void send_peer(supine_stream_server *s, supine_stream_peer *peer) {
+  const supine_stream_outcome told = supine_stream_peer_send_status(peer);
+  if (told == SUPINE_STREAM_LOST) {
+    end_peer(s, peer);
+  }
+  if (told != SUPINE_STREAM_DONE) {
+    return;
+  }
   if (needs_frame(s, peer) && supine_stream_peer_ready(peer)) {
     supine_stream_peer_give(peer, s->frames, s->latest);
     peer->given = s->woke;
@@ -281,7 +292,8 @@ static int find_timeout(const supine_stream_server *s, double end) {
 static void gather(supine_stream_server *s) {
   for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
     const supine_stream_peer *peer = &s->peer[i];
-    const bool writes = peer->connecting || peer->frame != NULL;
+    const bool writes =
+        peer->connecting || peer->frame != NULL || supine_stream_peer_has_status(peer);
     s->polled[i] = (struct pollfd){peer->socket, (short)(POLLIN | (writes ? POLLOUT : 0)), 0};
   }
   s->polled[LISTENER] = (struct pollfd){s->woke >= s->accept_at ? s->listener : -1, POLLIN, 0};
@@ -309,7 +321,10 @@ static void receive_all(supine_stream_server *s) {
     double gravity[3];
     double received = 0.0;
     if (supine_stream_web_take(s->options->web, gravity, &received)) {
-      supine_stream_patient_pose(&s->patient, gravity, received);
+      supine_error error;
+      if (supine_stream_patient_pose(&s->patient, gravity, received, &error) != SUPINE_OK) {
+        supine_stream_patient_warn(&s->patient, s->woke, "%s", supine_options_explain(&error).text);
+      }
     }
   }
 }

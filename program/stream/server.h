@@ -33,7 +33,7 @@ typedef struct supine_stream_counts {
   size_t invalid;     /**< poses that the tracker marked as invalid */
   size_t malformed;   /**< messages with a wrong checksum or inconsistent lengths */
   size_t skipped;     /**< messages without use, and too large ones */
-  size_t unreachable; /**< frames without the wanted volume, because it was unreachable */
+  size_t unreachable; /**< volumes that were not used, as the lungs cannot hold them */
   size_t frames;
   size_t sent;        /**< frames sent, summed over peers */
   size_t peers;       /**< peers accepted */

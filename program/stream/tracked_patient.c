@@ -22,12 +22,25 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
   return SUPINE_OK;
 }
 
-supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
-                                       supine_error *error) {
-  supine_state state = {.gravity = {0.0, 1.0, 0.0}};
-  SUPINE_TRY(supine_state_parse_volume(text, &state, error));
-  *volume = (supine_stream_volume){.fixed = state};
-  return SUPINE_OK;
+supine_status supine_stream_volume_judge(const supine_stream_volume *volume,
+                                         const supine_basis *basis, const double gravity[3],
+                                         supine_error *error) {
+  const supine_state *fixed = &volume->fixed;
+  supine_pose pose;
+  SUPINE_REFUSE_IF(!volume->breathes && supine_basis_get_info(basis)->hilum != NULL &&
+                       fixed->lung_count == 0 && fixed->volume.kind == SUPINE_VOLUME_SCAN &&
+                       fixed->volume.ml == 0.0,
+                   error, SUPINE_ERROR_UNSUPPORTED,
+                   "the volume scan is that of the lungs before their collapse: give another");
+  if (volume->breathes) {
+    const supine_state rest = supine_options_breath_state(basis, gravity, 0.0);
+    const supine_state full = supine_options_breath_state(basis, gravity, volume->breath.tidal);
+    SUPINE_TRY(supine_basis_pose(basis, &rest, &pose, error));
+    return supine_basis_pose(basis, &full, &pose, error);
+  }
+  supine_state state = *fixed;
+  memcpy(state.gravity, gravity, sizeof state.gravity);
+  return supine_basis_pose(basis, &state, &pose, error);
 }
 
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
@@ -83,13 +96,19 @@ static void note_pose(supine_stream_patient *p, double received, uint64_t stamp)
   p->stamp = stamp;
 }
 
-/* Store a pose unless `verdict` refuses it. Warn if the pose is refused or repaired. */
-static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict, const char *why,
-                        const double gravity[3], double received, uint64_t stamp) {
+/* Store a pose, unless `verdict` refuses it or the lungs cannot hold their volume in it. Warn if
+ * the pose is repaired. */
+static supine_status accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
+                                 const char *why, const double gravity[3], double received,
+                                 uint64_t stamp, supine_error *error) {
+  supine_error wrong;
   if (verdict == SUPINE_STREAM_REFUSED) {
     ++p->counts->refused;
-    supine_stream_patient_warn(p, received, "a pose is refused: %s", why);
-    return;
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a pose is refused: %s", why);
+  }
+  if (supine_stream_volume_judge(p->options->volume, p->basis, gravity, &wrong) != SUPINE_OK) {
+    ++p->counts->refused;
+    return supine_error_wrap(error, &wrong, "a pose is refused: ");
   }
   if (verdict == SUPINE_STREAM_REPAIRED) {
     ++p->counts->repaired;
@@ -98,6 +117,21 @@ static void accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
   memcpy(p->gravity, gravity, sizeof p->gravity);
   note_pose(p, received, stamp);
   ++p->counts->poses;
+  return SUPINE_OK;
+}
+
+/* Store a fixed volume, unless the lungs cannot hold it in the present posture. */
+static supine_status accept_volume(supine_stream_patient *p, const supine_state *fixed,
+                                   double received, supine_error *error) {
+  const supine_stream_volume volume = {.fixed = *fixed};
+  supine_error wrong;
+  if (supine_stream_volume_judge(&volume, p->basis, p->gravity, &wrong) != SUPINE_OK) {
+    ++p->counts->unreachable;
+    return supine_error_wrap(error, &wrong, "a volume is refused: ");
+  }
+  *p->options->volume = volume;
+  note_message(p, received);
+  return SUPINE_OK;
 }
 
 /* Store the position of an observed point; a not-a-number position means that the point is not
@@ -133,13 +167,37 @@ static void store_positions(supine_stream_patient *p, const supine_stream_messag
   }
 }
 
-void supine_stream_patient_receive(supine_stream_patient *patient,
-                                   const supine_stream_message *message, double received,
-                                   uint64_t stamp) {
-  const supine_stream_setup *setup = &patient->options->setup;
-  supine_stream_volume *volume = patient->options->volume;
+/* Store the rotation of a tracker, or its position if an observed point has its name. */
+static supine_status receive_rotation(supine_stream_patient *p,
+                                      const supine_stream_message *message, double received,
+                                      uint64_t stamp, supine_error *error) {
+  double gravity[3];
+  const char *why = NULL;
+  if (store_position(p, message->text, message->number + 9, received, stamp)) {
+    return SUPINE_OK;
+  }
+  const supine_stream_verdict verdict =
+      supine_stream_gravity_rotation(&p->options->setup, message->number, gravity, &why);
+  return accept_pose(p, verdict, why, gravity, received, stamp, error);
+}
+
+/* Store a volume that a message gives as text. */
+static supine_status receive_volume(supine_stream_patient *p, const char *text, double received,
+                                    supine_error *error) {
+  supine_state state = {.lung_count = 0};
+  supine_error wrong;
+  if (supine_state_parse_volume(text, &state, &wrong) != SUPINE_OK) {
+    ++p->counts->unreachable;
+    return supine_error_wrap(error, &wrong, "a volume is refused: ");
+  }
+  return accept_volume(p, &state, received, error);
+}
+
+supine_status supine_stream_patient_receive(supine_stream_patient *patient,
+                                            const supine_stream_message *message, double received,
+                                            uint64_t stamp, supine_error *error) {
+  const supine_state above_rest = {.volume = {SUPINE_VOLUME_REST, message->number[0]}};
   supine_stream_verdict verdict = SUPINE_STREAM_EXACT;
-  supine_error error;
   double gravity[3];
   const char *why = NULL;
   switch (message->kind) {
@@ -150,49 +208,30 @@ void supine_stream_patient_receive(supine_stream_patient *patient,
     store_positions(patient, message, received, stamp);
     break;
   case SUPINE_STREAM_ROTATION:
-    if (store_position(patient, message->text, message->number + 9, received, stamp)) {
-      break;
-    }
-    verdict = supine_stream_gravity_rotation(setup, message->number, gravity, &why);
-    accept_pose(patient, verdict, why, gravity, received, stamp);
-    break;
+    return receive_rotation(patient, message, received, stamp, error);
   case SUPINE_STREAM_DOWN:
-    verdict = supine_stream_gravity_down(setup, message->number, gravity, &why);
-    accept_pose(patient, verdict, why, gravity, received, stamp);
-    break;
+    verdict = supine_stream_gravity_down(&patient->options->setup, message->number, gravity, &why);
+    return accept_pose(patient, verdict, why, gravity, received, stamp, error);
   case SUPINE_STREAM_VOLUME:
-    if (isfinite(message->number[0])) {
-      *volume =
-          (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_REST, message->number[0]}}};
-      note_message(patient, received);
-    } else {
-      supine_stream_patient_warn(patient, received,
-                                 "a volume is refused: it is not finite; send a number of mL");
-    }
-    break;
+    return accept_volume(patient, &above_rest, received, error);
   case SUPINE_STREAM_VOLUME_TEXT:
-    if (supine_stream_volume_fix(volume, message->text, &error) != SUPINE_OK) {
-      supine_stream_patient_warn(patient, received, "a volume is refused: %s",
-                                 supine_options_explain(&error).text);
-    } else {
-      note_message(patient, received);
-    }
-    break;
+    return receive_volume(patient, message->text, received, error);
   case SUPINE_STREAM_NOTHING:
   case SUPINE_STREAM_REQUEST:
   case SUPINE_STREAM_INVALID:
     ++patient->counts->skipped;
     break;
   }
+  return SUPINE_OK;
 }
 
-void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
-                                double received) {
+supine_status supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
+                                         double received, supine_error *error) {
   const supine_stream_setup body = supine_stream_setup_default();
   double unit[3];
   const char *why = NULL;
   const supine_stream_verdict verdict = supine_stream_gravity_down(&body, gravity, unit, &why);
-  accept_pose(patient, verdict, why, unit, received, 0);
+  return accept_pose(patient, verdict, why, unit, received, 0, error);
 }
 
 static uint64_t stamp_now(void) {
@@ -201,39 +240,18 @@ static uint64_t stamp_now(void) {
   return ((uint64_t)now.tv_sec << 32) | (((uint64_t)now.tv_nsec << 32) / 1000000000u);
 }
 
-/* Keep the last pose that was found, in the present direction of gravity: with its gains, the
- * factors of each lung's displacement, unless the weights depend on the volume too. */
-static void keep_pose(supine_stream_patient *patient, supine_stream_snapshot *snapshot) {
-  double weights[SUPINE_MODES_MAX];
-  const supine_basis_info *info = supine_basis_get_info(patient->basis);
-  snapshot->pose = patient->last;
-  if (supine_basis_weights(patient->basis, snapshot->gravity, weights) == SUPINE_OK) {
-    memcpy(snapshot->pose.weights, weights, info->mode_count * sizeof *weights);
-  }
-}
-
-/* Compute the pose for the current volume. If the lungs cannot reach this volume, keep the last one
- * that they could. Then compute the resulting volumes. */
-static void find_pose(supine_stream_patient *patient, double now,
+/* Compute the pose and the volumes of the present posture and volume, which
+ * supine_stream_volume_judge has accepted. */
+static void find_pose(const supine_stream_patient *patient, double now,
                       supine_stream_snapshot *snapshot) {
   const supine_basis *basis = patient->basis;
   const supine_state state = supine_stream_volume_at(
       patient->options->volume, basis, snapshot->gravity, now - patient->breath_begun);
   const supine_state rest = supine_options_breath_state(basis, snapshot->gravity, 0.0);
-  supine_error error;
   if (supine_basis_pose(basis, &rest, &snapshot->pose, NULL) == SUPINE_OK) {
     snapshot->above = -supine_posed_volume(basis, &snapshot->pose);
   }
-  if (supine_basis_pose(basis, &state, &snapshot->pose, &error) == SUPINE_OK) {
-    patient->last = snapshot->pose;
-  } else {
-    char text[96];
-    ++patient->counts->unreachable;
-    (void)supine_state_describe(&state, text, sizeof text);
-    supine_stream_patient_warn(patient, now, "the state %s cannot be shown: %s", text,
-                               supine_options_explain(&error).text);
-    keep_pose(patient, snapshot);
-  }
+  (void)supine_basis_pose(basis, &state, &snapshot->pose, NULL);
   snapshot->volume = supine_posed_volume(basis, &snapshot->pose);
   snapshot->above += snapshot->volume;
 }

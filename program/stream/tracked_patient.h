@@ -19,9 +19,13 @@ struct supine_stream_volume {
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,
                                            const supine_pv_breath *breath, supine_error *error);
 
-/** Set a fixed volume from a text such as rest+500; leave it unchanged if the text is wrong. */
-supine_status supine_stream_volume_fix(supine_stream_volume *volume, const char *text,
-                                       supine_error *error);
+/** Check that the lungs can hold a fixed volume or, at both ends, a breath.
+ * @param gravity  [3] direction of gravity
+ * @return the status of supine_basis_pose; SUPINE_ERROR_UNSUPPORTED for the scan of a lung that has
+ *         collapsed since */
+supine_status supine_stream_volume_judge(const supine_stream_volume *volume,
+                                         const supine_basis *basis, const double gravity[3],
+                                         supine_error *error);
 
 /** Return the state for the unit vector `gravity`, `time` seconds after the breath begins. */
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
@@ -39,7 +43,6 @@ typedef struct supine_stream_patient {
   uint64_t stamp;       /* time stamp of the newest pose or point, 2^-32 s since 1970; 0 if none */
   double gravity[3];    /* direction of gravity in the newest pose */
   double warned_at;
-  supine_pose last; /* last pose whose volume the lungs could reach */
 } supine_stream_patient;
 
 /* Return a patient who lies supine until a pose is received. */
@@ -51,15 +54,18 @@ supine_stream_patient supine_stream_patient_begin(const supine_basis *basis,
 void supine_stream_patient_warn(supine_stream_patient *patient, double now, const char *format, ...)
     SUPINE_PRINTF(3, 4);
 
-/* Store the pose, the volume or the observed points of a message; ignore other messages. */
-void supine_stream_patient_receive(supine_stream_patient *patient,
-                                   const supine_stream_message *message, double received,
-                                   uint64_t stamp);
+/* Store the pose, the volume or the observed points of a message; ignore other messages. Refuse a
+ * message whole: the posture and the volume of before then stay together.
+ * @retval SUPINE_ERROR_ARGUMENT   the message has no pose or no volume
+ * @retval SUPINE_ERROR_NUMERICAL  the lungs cannot hold the volume in the posture */
+supine_status supine_stream_patient_receive(supine_stream_patient *patient,
+                                            const supine_stream_message *message, double received,
+                                            uint64_t stamp, supine_error *error);
 
 /* Store a pose from a file or a phone: the direction of gravity in body axes, of any length. A
- * vector that is zero or not finite is refused. */
-void supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
-                                double received);
+ * vector that is zero or not finite is refused. Statuses: as supine_stream_patient_receive. */
+supine_status supine_stream_patient_pose(supine_stream_patient *patient, const double gravity[3],
+                                         double received, supine_error *error);
 
 /* Compute the state of the lungs at `now`, and mark the newest message as shown. */
 void supine_stream_patient_snapshot(supine_stream_patient *patient, double now,

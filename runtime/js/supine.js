@@ -14,7 +14,8 @@ const EXACT = 1; // SUPINE_STORAGE_EXACT
 const FRAME = 24; // SUPINE_GL_FRAME_FLOATS
 const KINDS_OF_VOLUME = { rest: 1, full: 2, scan: 3 }; // supine_volume_kind
 // What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
-const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper"];
+const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper",
+  ", or open the basis with allowFolds"];
 const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a smaller gain';
 /** Metadata "checksum" of a file that open() completes (its option `seal`). */
 export const UNSEALED = 'xxh64:0000000000000000';
@@ -50,6 +51,13 @@ function members(state) {
   if (typeof volume !== 'string') throw refusal('the volume of a state must be a text such as rest+500');
   if (gain !== undefined && volume !== '') throw refusal('a state has a volume and a gain: give one of them');
   return state;
+}
+
+/** Return a finite number as it is. Refuse what JavaScript would convert to one, such as null, '' and []. */
+function number(value, name) {
+  if (typeof value !== 'number') throw refusal(`${name} has ${JSON.stringify(value) ?? typeof value}: give a number`);
+  if (!Number.isFinite(value)) throw refusal(`${name} is ${value}: give a finite number`);
+  return value;
 }
 
 /** Divide the sums of a target by the number of its vertices. */
@@ -163,16 +171,11 @@ class Basis {
 
   pose(state) {
     this.#read(state);
-    const fixed = state.gain !== undefined;
-    if (fixed) this.#number(state.gain, 'gain');
-    if (fixed) {
-      const status = this.#c.supine_basis_weights(this.#basis, this.#nextState, this.#nextPose);
-      const byVolume = 'displacements of this basis depend on the volume: give a volume instead of a gain';
-      const zero = 'gravity is zero or not finite: give a vector with a direction';
-      this.#check(status, STATUS[status] === 'unsupported' ? byVolume : zero);
-      this.#c.supine_pose_fill(this.#nextPose, state.gain);
+    const { supine_basis_pose: pose, supine_basis_pose_gain: poseGain } = this.#c;
+    if (state.gain === undefined) {
+      this.#check(pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
     } else {
-      this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+      this.#check(poseGain(this.#basis, this.#nextState, number(state.gain, 'gain'), this.#nextPose, this.#error));
     }
     this.#take();
     return this;
@@ -298,7 +301,8 @@ class Basis {
     const isText = typeof state === 'string';
     const { gravity = [0, 1, 0], volume = '' } = isText ? {} : members(state);
     this.#view(Uint8Array, this.#nextState, STATE).fill(0);
-    const three = Array.from(gravity, Number);
+    const isList = typeof gravity === 'object' && gravity !== null;
+    const three = isList ? Array.from(gravity, (x) => number(x, 'gravity')) : [];
     if (three.length !== 3) throw refusal('gravity must be three numbers');
     this.#view(Float64Array, this.#nextState, 3).set(three);
     const { supine_state_parse: parse, supine_state_parse_volume: parseVolume } = this.#c;
@@ -326,10 +330,6 @@ class Basis {
 
   #evaluate(status) {
     this.#check(status, NOT_FINITE);
-  }
-
-  #number(value, name) {
-    if (!Number.isFinite(value)) throw refusal(`${name} is ${value}: give a finite number`);
   }
 
   #allocate(size) {

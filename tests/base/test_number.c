@@ -27,6 +27,8 @@ TEST(test_number_parse_any_text_takes_the_point_only) {
                {"1E-5x", 1e-5, 4},
                {"nonsense", 0.0, 0},
                {"0.1e1", 1.0, 5},
+               {"0x10", 0.0, 1},
+               {" -0X1p3", 0.0, 3},
                {"--5", 0.0, 0},
                {"+-5", 0.0, 0},
                {"\xA0"
@@ -42,6 +44,17 @@ TEST(test_number_parse_any_text_takes_the_point_only) {
                cases[i].length);
     }
   }
+}
+
+TEST(test_number_shorten_long_runs_of_digits_only) {
+  char text[512];
+  assert_int_equal(supine_print_text(text, sizeof text, "%.0f mL, %.0f %%, 12345678901234567890",
+                                     1.5e308, -2e21),
+                   309 + 5 + 23 + 24);
+  supine_number_shorten(text);
+  assert_string_equal(text, "1.50e+308 mL, -2.00e+21 %, 12345678901234567890");
+  supine_number_shorten(text);
+  assert_string_equal(text, "1.50e+308 mL, -2.00e+21 %, 12345678901234567890");
 }
 
 TEST(test_number_print_reals_with_a_point_and_commas_of_the_text_as_they_are) {

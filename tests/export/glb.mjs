@@ -188,7 +188,7 @@ async function checkFields(basis) {
     const off = largestDistance(together(lungs, extras), inOrder(truth[i].xyz, order));
     assert.ok(off < FIELDS_MM, `fields along ${g}: ${off} mm off`);
   });
-  for (const option of [['--breath', '700'], ['--animate']]) assert.throws(() => supine('export', basis, ...option, '-o', path), /no breaths: leave --breath and --animate out/);
+  for (const option of [['--breath', '700mL'], ['--animate']]) assert.throws(() => supine('export', basis, ...option, '-o', path), /no breaths: leave --breath and --animate out/);
 }
 
 /** Return the weights of the morph targets of each lung of another simulator's fields over gravity and volume at which it
@@ -211,7 +211,7 @@ function simulatedWeights({ band, order, modes, modeUnit }, lungs, gravity, volu
 async function checkBreathingFields(storage) {
   const [basis, path] = ['breathing.safetensors', 'breathing.glb'].map((name) => join(folder, name));
   breathingFieldsBasis(basis, 1000, storage);
-  supine('export', basis, '-o', path, '--animate', '--breath', '400');
+  supine('export', basis, '-o', path, '--animate', '--breath', '400mL');
   await validate(path);
   const { gltf, lungs, extras } = await open(path);
   assert.match(extras.gains, /^s = 1 and t = 0/);

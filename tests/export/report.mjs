@@ -19,7 +19,7 @@ const html = join(folder, 'report.html');
 const [points, inside] = ['points.csv', 'inside.safetensors'].map((name) => join(folder, name));
 writeFileSync(points, 'name,x,y,z\nnodule,-80,-120,-90\nmark,70,-150,-60\n');
 supine('embed', basis, points, '-o', inside);
-supine('compare', basis, '--inside', inside, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350', '-o', html);
+supine('compare', basis, '--inside', inside, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350mL', '-o', html);
 
 const { page, complaints } = await open(html);
 const cells = await page.evaluate(() => [...document.querySelectorAll('table')].map((table) => ({
@@ -121,7 +121,7 @@ for (const format of ['A4', 'Letter']) {
 
 /* Without targets there are outlines in four slices, whose areas differ from that of the reference by the stated
  * percentages. */
-supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350', '-o', join(folder, 'plain.html'));
+supine('compare', basis, '--postures', postures.join(','), '--volume', 'rest+120', '--breath', '350mL', '-o', join(folder, 'plain.html'));
 const { page: plain } = await open(join(folder, 'plain.html'));
 const outlines = await plain.evaluate(() => [...document.querySelectorAll('.pairs figure')].map((figure) => ({
   title: figure.querySelector('figcaption').textContent,

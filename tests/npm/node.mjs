@@ -104,6 +104,12 @@ assert.equal(Math.max(...lungs.triangles), lungs.vertexCount - 1);
 assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.ok(lungs.tensor('normals').data instanceof Int8Array); // numbers.mjs reads every tensor of a file
+for (const nothing of [null, '', [], '1', true]) {
+  assert.throws(() => lungs.pose({ gravity: [0, nothing, 1] }), { status: 'argument', message: /gravity has .*: give a number/ });
+  assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain: nothing }), { status: 'argument', message: /gain has .*: give a number/ });
+  assert.throws(() => lungs.pose({ gravity: nothing }), { status: 'argument', message: /gravity must be three numbers/ });
+}
+assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain: 9.81 }), { status: 'numerical', message: /allowFolds/ });
 for (const gain of [NaN, Infinity]) assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 

@@ -955,7 +955,7 @@ TEST(test_fields_basis_volumes_and_breaths_refused) {
       "deform b.safetensors --posture prone --volume 3000mL -o a.ply",
       "deform b.safetensors --posture prone --volume scan -o a.ply",
       "deform b.safetensors --posture prone --volume left=scan,right=scan+100 -o a.ply",
-      "compare b.safetensors --breath 500",
+      "compare b.safetensors --breath 500mL",
       "compare b.safetensors --volume rest",
       "breathe b.safetensors --posture supine -o a.vtp",
       "stream b.safetensors --listen 0 --volume full"};

@@ -243,7 +243,7 @@ TEST(test_breathe_all_options_volumes_exact_in_every_frame) {
                                    .inhale_fraction = 0.4,
                                    .rest_pressure = 8.0,
                                    .course = SUPINE_PV_RAMP};
-  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "300", "--rate", "20", "--inhale",
+  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "300mL", "--rate", "20", "--inhale",
                        "0.4", "--rest-pressure", "8", "--course", "ramp", "--fps", "30", "-o",
                        breath),
                    SUPINE_EXIT_OK);
@@ -256,7 +256,7 @@ TEST(test_breathe_bad_arguments_usage_error) {
   static const char *const bad[][2] = {{"--rate", "0"},
                                        {"--rate", "-3"},
                                        {"--rate", "often"},
-                                       {"--tidal", "0"},
+                                       {"--tidal", "0mL"},
                                        {"--inhale", "1"},
                                        {"--inhale", "0"},
                                        {"--fps", "0"},
@@ -289,7 +289,7 @@ TEST(test_breathe_missing_files_or_huge_breath_refused) {
   assert_int_equal(RUN("/nowhere", "--posture", "supine", "-o", breath), SUPINE_EXIT_INPUT);
   assert_int_equal(RUN(basis, "--posture", "supine", "--pv", "/nowhere", "-o", breath),
                    SUPINE_EXIT_INPUT);
-  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "90000", "-o", breath),
+  assert_int_equal(RUN(basis, "--posture", "supine", "--tidal", "90000mL", "-o", breath),
                    SUPINE_EXIT_USAGE);
   assert_says(text, "90000");
 }

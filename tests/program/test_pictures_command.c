@@ -86,7 +86,7 @@ static void check_posture(const json_t *posture) {
 TEST(test_compare_json_has_stated_values) {
   EXPECT(0, "{",
          "compare lungs.safetensors --postures supine,prone,supine+15,0.6:0:-0.8 "
-         "--volume rest --breath 400 --json");
+         "--volume rest --breath 400mL --json");
   json_error_t problem;
   json_t *root = json_loads(printed, 0, &problem);
   assert_non_null(root);

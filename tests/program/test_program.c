@@ -84,7 +84,7 @@ TEST(test_deform_volume_reached) {
          "deform lungs.safetensors --posture left:scan-300 --volume full -o a.ply");
   EXPECT(1, "every posture names its own volume",
          "compare lungs.safetensors --postures supine:full,prone:rest --volume rest");
-  EXPECT(0, "the breath ends at", "compare lungs.safetensors --postures supine --breath 3500");
+  EXPECT(0, "the breath ends at", "compare lungs.safetensors --postures supine --breath 3500mL");
   EXPECT(1, "supine:rest+500", "deform lungs.safetensors --posture supine+500 -o a.ply");
   EXPECT(0, "gravity 0.7071,0,0.7071", "deform lungs.safetensors --posture left+45 -o a.ply");
   EXPECT(0, ", 2900.00 mL", "deform lungs.safetensors --posture left --volume 2.9L -o a.ply");
@@ -112,13 +112,13 @@ TEST(test_deform_volume_reached) {
   EXPECT(1, "give rest, full or scan",
          "deform lungs.safetensors --posture left --volume resting -o b.ply");
   EXPECT(5,
-         "lungs.safetensors: prone at full inflation + 3000 mL: 9000 mL are 150 % of full "
-         "inflation (6000 mL), outside the 10 to 120 %",
+         "lungs.safetensors: prone: prone at full inflation + 3000 mL: 9000 mL are 150 % "
+         "of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
   EXPECT(0, "note: without a breath: left side at 8261 mL: 8261 mL are 138 % of",
-         "compare lungs.safetensors --postures left --volume rest --breath 5000 -o a.html");
+         "compare lungs.safetensors --postures left --volume rest --breath 5000mL -o a.html");
   EXPECT(5, "8025 mL are 134 % of",
-         "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 -o b.vtp");
+         "breathe lungs.safetensors --posture prone --tidal 4900mL --fps 2 -o b.vtp");
   EXPECT(5, "outside the 10 to 120 %",
          "solve lungs.ply --posture left --volume scan-5700 -o b.ply");
   EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
@@ -136,10 +136,10 @@ TEST(test_deform_volume_reached) {
   EXPECT(0, "outside the 10 to 120 %",
          "solve lungs.ply --posture left --volume full+1300 --allow-folds -o a.ply");
   EXPECT(0, "8025 mL are 134 % of",
-         "breathe lungs.safetensors --posture prone --tidal 4900 --fps 2 --allow-folds "
+         "breathe lungs.safetensors --posture prone --tidal 4900mL --fps 2 --allow-folds "
          "-o a.safetensors");
   EXPECT(0, "8261 mL are 138 % of",
-         "compare lungs.safetensors --postures left --breath 5000 --allow-folds");
+         "compare lungs.safetensors --postures left --breath 5000mL --allow-folds");
   EXPECT(0, "outside the 10 to 120 %",
          "deform lungs.safetensors --posture left --volume scan-5500 --allow-folds -o a.ply");
 }

@@ -89,6 +89,20 @@ assert np.abs(lungs.vertices + moved - raw[0]).max() <= 2 * lungs.error(pose)
 assert bytes(lungs.pose((0, -2, 0), "rest+321.5")) == bytes(pose) == bytes(lungs.pose(STATE, out=supine.Pose()))
 assert (lungs.deform(supine.Pose().fill(0.0)) == lungs.deform(lungs.pose("full"))).all()
 
+# A gain is judged by the volumes that it gives, in the posture of the pose.
+full = lungs.pose("full")
+assert np.abs(lungs.deform(lungs.pose("prone").fill(1.0)) - lungs.deform(full)).max() > 1
+refused(supine.NumericalError, "of full inflation", lungs.pose("prone").fill, 9.81)
+refused(supine.ArgumentError, "finite", lungs.pose("prone").fill, np.nan)
+supine.open(path, allow_folds=True).pose("prone").fill(9.81)
+
+# A number is neither a volume nor a state.
+for wrong in (2600, 2600.0, np.float64(2600)):
+    refused(supine.ArgumentError, "'2600mL'", lungs.pose, "prone", wrong)
+    refused(supine.ArgumentError, "'2600mL'", lungs.pose, wrong)
+refused(supine.ArgumentError, "give a text", lungs.pose, "prone", None)
+refused(supine.ArgumentError, "20 mL or more", supine.breath, [0], tidal=0.5)
+
 # A pose of another basis is refused, but a basis and the structures embedded in it share their poses.
 other = supine.open("other.safetensors").pose("prone")
 refused(supine.ArgumentError, "made by another basis", lungs.deform, other)

@@ -547,6 +547,40 @@ static void check_view(bool vector, bool volume) {
   fixture_destroy(f);
 }
 
+TEST(test_pose_gain_beyond_limits_refused_unless_allowed) {
+  fixture *f = fixture_create(200, 4, 2, 2, false, true, 10.0, 5);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  const double gravity[3] = {0, -2, 0};
+  static const double none[3] = {0};
+  for (int allowed = 0; allowed < 2; ++allowed) {
+    const supine_basis_options options = {sizeof options, .allow_folds = allowed == 1};
+    supine_basis *basis = NULL;
+    supine_pose pose;
+    supine_pose wanted = {.basis = 0};
+    supine_error error;
+    assert_int_equal(supine_basis_open_memory_with(bytes, size, &options, &basis, NULL), SUPINE_OK);
+    assert_int_equal(supine_basis_pose_gain(basis, gravity, 1.3, &pose, &error), SUPINE_OK);
+    assert_int_equal(supine_basis_weights(basis, gravity, wanted.weights), SUPINE_OK);
+    supine_pose_fill(&wanted, 1.3);
+    wanted.basis = supine_basis_get_info(basis)->identity;
+    assert_memory_equal(&pose, &wanted, sizeof pose);
+    const supine_status status = supine_basis_pose_gain(basis, gravity, -9.81, &pose, &error);
+    assert_int_equal(status, allowed == 1 ? SUPINE_OK : SUPINE_ERROR_NUMERICAL);
+    if (allowed == 0) {
+      assert_non_null(strstr(error.message, "give a gain of -5 to 5"));
+      assert_int_equal(error.remedy, SUPINE_REMEDY_ALLOW_FOLDS);
+    }
+    assert_int_equal(supine_basis_pose_gain(basis, gravity, NAN, &pose, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_int_equal(supine_basis_pose_gain(basis, none, 1.0, &pose, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    supine_basis_close(basis);
+  }
+  free(bytes);
+  fixture_destroy(f);
+}
+
 TEST(test_accessors_open_basis_equal_file) {
   check_view(false, true);
   check_view(true, true);

@@ -193,11 +193,13 @@ TEST(test_pose_simulated_outside_range_refused_with_range) {
   const double low = all * (0.8 + 0.02 * oblique[1]);
   const double high = all * (1.2 + 0.02 * oblique[1]);
   (void)snprintf(range, sizeof range, "the lungs hold %.0f to %.0f mL", low, high);
-  const double wrong[] = {low - 1, high + 1, -1e9, 1e300};
+  const double wrong[] = {low - 1, high + 1, -1e9, 1e14};
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
     const supine_state asked = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, wrong[i]);
     assert_pose_refused(&asked, SUPINE_ERROR_NUMERICAL, range);
   }
+  const supine_state endless = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, 1e300);
+  assert_pose_refused(&endless, SUPINE_ERROR_ARGUMENT, "above 1e+15 mL");
   double held[2];
   const supine_state lowest = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, low + 1e-3);
   const supine_state highest = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, high - 1e-3);

@@ -25,7 +25,7 @@ echo subject,meshes,options >subjects.csv
 for i in $(seq -w 1 40); do
   volume=$((2000 + ${i#0} * 37 % 900))
   [ "$i" = 17 ] && volume=9000
-  "$supine" phantom --vertices 300 --volume "$volume" -o "meshes/$i.ply" >/dev/null || exit 1
+  "$supine" phantom --vertices 300 --volume "${volume}mL" -o "meshes/$i.ply" >/dev/null || exit 1
   echo "sub-$i,meshes/$i.ply,--band 2" >>subjects.csv
 done
 rm meshes/05.ply
@@ -48,7 +48,7 @@ tr -d '\r' <results/group.csv | grep '^sub-17' | grep -q 'left_lung_ml' || fail 
 flow "$@" || fail "the second run"
 grep -q 'Nothing to be done' said || fail "the second run computed something: $(cat said)"
 cp results/sub-08/result.json before.json
-"$supine" phantom --vertices 300 --volume 2222 -o meshes/07.ply >/dev/null
+"$supine" phantom --vertices 300 --volume 2222mL -o meshes/07.ply >/dev/null
 flow "$@" || fail "the third run"
 grep -q '^subject *1' said || fail "one changed input recomputed: $(grep -A6 '^job' said)"
 cmp -s before.json results/sub-08/result.json || fail "another subject was computed again"

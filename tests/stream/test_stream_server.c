@@ -375,6 +375,39 @@ TEST(test_server_volume_above_rest_equals_basis_pose) {
   stage_destroy(s);
 }
 
+TEST(test_server_volume_refused_keeps_state_and_tells_peer) {
+  stage *s = stage_create();
+  const int peer = connect_peer(stage_run(s));
+  supine_stream_header header;
+  unsigned char body[4096];
+  static const char *const wrong[] = {"rest+100000", "500", "rest+1e300"};
+  assert_true(send_pose(peer, poses[3], 1));
+  (void)receive_stamp(peer, 1, &header, body);
+  for (uint64_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    assert_true(send_text(peer, "VOLUME", wrong[i]));
+    do {
+      assert_true(receive(peer, &header, body));
+    } while (strcmp(header.type, "STATUS") != 0);
+    assert_string_equal(header.device, "SUPINE");
+    assert_memory_equal(body, "\0\10\0\0\0\0\0\0\0\0refused", 17);
+    assert_non_null(strstr((const char *)body + 30, "a volume is refused: "));
+    assert_true(header.size == 30 + strlen((const char *)body + 30) + 1);
+    assert_true(send_pose(peer, poses[3], 2 + i));
+    (void)receive_stamp(peer, 2 + i, &header, body);
+    expect_weights(s, poses[3], 30.0, body);
+  }
+  assert_true(send_pose(peer, (const double[3]){0}, 9));
+  do {
+    assert_true(receive(peer, &header, body));
+  } while (strcmp(header.type, "STATUS") != 0);
+  assert_non_null(strstr((const char *)body + 30, "a pose is refused: its direction is zero"));
+  (void)close(peer);
+  const supine_stream_counts counts = stage_end(s);
+  assert_int_equal(counts.unreachable, 3);
+  assert_int_equal(counts.refused, 1);
+  stage_destroy(s);
+}
+
 /* In fields over gravity and volume, weights and points are those of each lung at its own volume.
  */
 TEST(test_server_simulated_two_volumes_equal_basis_pose) {

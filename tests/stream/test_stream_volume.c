@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test volumes given as text, and volumes of a breath. */
+/* Test the judgement of volumes, and volumes of a breath. */
 #include "program/stream/tracked_patient.h"
 #include "tests/helpers/runtime_fixture.h"
 #include "tests/helpers/test.h"
@@ -12,7 +12,7 @@ static void expect_volume(const supine_stream_volume *volume, const supine_basis
   assert_true(at.volume.ml == wanted.ml);
 }
 
-TEST(test_volume_parse_each_form_literal) {
+TEST(test_volume_judge_and_breath_equal_library) {
   fixture *made = fixture_create(200, 4, 2, 2, false, true, 10.0, 5);
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(made, &size);
@@ -21,25 +21,14 @@ TEST(test_volume_parse_each_form_literal) {
   assert_int_equal(supine_basis_open_memory(bytes, size, &basis, &error), SUPINE_OK);
   supine_stream_volume *volume = fixture_allocate(1, sizeof *volume);
   const double gravity[3] = {0, 1, 0};
-  static const struct {
-    const char *text;
-    supine_volume volume;
-  } good[] = {
-      {"rest", {SUPINE_VOLUME_REST, 0}},          {"rest+350", {SUPINE_VOLUME_REST, 350}},
-      {"rest-20.5", {SUPINE_VOLUME_REST, -20.5}}, {"full", {SUPINE_VOLUME_FULL, 0}},
-      {"full-1200", {SUPINE_VOLUME_FULL, -1200}}, {"2600mL", {SUPINE_VOLUME_ABSOLUTE, 2600}},
-      {"scan+40", {SUPINE_VOLUME_SCAN, 40}}};
-  for (size_t i = 0; i < sizeof good / sizeof *good; ++i) {
-    assert_int_equal(supine_stream_volume_fix(volume, good[i].text, &error), SUPINE_OK);
-    expect_volume(volume, basis, gravity, 1.0, good[i].volume);
-  }
-  static const char *const bad[] = {"",    "rest 5", "rest+", "rest+x",   "fuller",
-                                    "nan", "inf",    "5 mL",  "rest+inf", "restful",
-                                    "500", "+40",    "-1200", "0"};
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
-    assert_int_equal(supine_stream_volume_fix(volume, bad[i], &error), SUPINE_ERROR_ARGUMENT);
-    /* The refused text `bad[i]` leaves the volume that the last good text has set. */
-    expect_volume(volume, basis, gravity, 1.0, good[6].volume);
+  *volume = (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_SCAN, 40.0}}};
+  assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, &error), SUPINE_OK);
+  expect_volume(volume, basis, gravity, 1.0, (supine_volume){SUPINE_VOLUME_SCAN, 40.0});
+  static const double wrong[] = {NAN, INFINITY, -1e300};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
+    volume->fixed.volume.ml = wrong[i];
+    assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, &error),
+                     SUPINE_ERROR_ARGUMENT);
   }
   /* The volume follows the breathing model, within a thousandth of the tidal volume. */
   const supine_pv_breath breath = supine_breath_default();

@@ -278,9 +278,9 @@ SUPINE_API supine_status supine_basis_coefficients(const supine_basis *basis, si
 
 /** Check that lungs can hold the volumes of a pose: 10 to 120 % of full inflation, without folds in
  * more than 1 % of the triangles of a lung. The file holds the range of volumes of each lung in 26
- * directions of gravity; between them it is interpolated. The state of the scan, and all states of
- * a file without these ranges, are taken. Limits: supine_input_get. Cost: mode_count^3 for each
- * lung.
+ * directions of gravity; between them it is interpolated. Folds are not checked if a file lacks
+ * these ranges, and volumes if it lacks the volume at rest. The state of the scan is taken. Limits:
+ * supine_input_get. Cost: mode_count^3 for each lung.
  * @param state  the state of the pose
  * @retval SUPINE_ERROR_NUMERICAL  lungs cannot hold these volumes; `error` says which */
 SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
@@ -290,9 +290,26 @@ SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const sup
  * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */
 SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
 
-/** Multiply the displacements of a pose by `gain`: set its gains for all lungs and axes to this
- * number, and its expansions to 0. Use this where the gains do not follow from a volume: for open
- * surfaces, or for displacements from another simulator, which a gain of 1 reproduces. */
+/** Compute the pose of a direction of gravity at which all displacements are multiplied by `gain`,
+ * whatever volume that gives. Use this where the gains do not follow from a volume: for open
+ * surfaces, or for displacements from another simulator, which a gain of 1 reproduces.
+ *
+ * The pose is checked as by supine_basis_check if the file has the volumes that its lungs can hold.
+ * For other files, the gain may be from -5 to 5 (supine_input_get, SUPINE_INPUT_GAIN). Neither is
+ * checked if the basis was opened with supine_basis_options.allow_folds. Cost: as
+ * supine_basis_pose.
+ * @param gravity  [3], any length but 0
+ * @param pose     written
+ * @retval SUPINE_ERROR_ARGUMENT     gravity is zero or not finite, or the gain is not finite
+ * @retval SUPINE_ERROR_NUMERICAL    the lungs cannot hold the volume, or the gain is too large
+ * @retval SUPINE_ERROR_UNSUPPORTED  the displacements depend on the volume too
+ *                                   (supine_basis_info.order) */
+SUPINE_API supine_status supine_basis_pose_gain(const supine_basis *basis, const double gravity[3],
+                                                double gain, supine_pose *pose,
+                                                supine_error *error);
+
+/** Set the gains of a pose for all lungs and axes to `gain`, and its expansions to 0. Nothing is
+ * checked: supine_basis_pose_gain does. */
 SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
 
 /** Return the gravity and the volume in the scan. The volume is of the kind SUPINE_VOLUME_SCAN.

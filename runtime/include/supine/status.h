@@ -55,6 +55,7 @@ typedef enum supine_remedy {
   SUPINE_REMEDY_NONE = 0, /**< the message says all */
   /* From the runtime library. */
   SUPINE_REMEDY_BASIS_WITH_REST, /**< use a basis whose scan has a known state */
+  SUPINE_REMEDY_ALLOW_FOLDS,     /**< compute states that lungs cannot hold */
   SUPINE_REMEDY_LOCATE_VOLUME,   /**< give the volume of the located lungs */
   /* Coordinates. */
   SUPINE_REMEDY_AXES,           /**< give the axes, for example `value` */

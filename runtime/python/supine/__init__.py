@@ -133,11 +133,16 @@ def breath(times: ArrayLike, *, tidal: float = 500.0, rate: float = 12.0, inhale
 
 class Pose(_c.CPose):
     """The weights of modes and the gains (factors of displacement) of a state of a basis, made by `Basis.pose`."""
+    _made: Optional[tuple[Any, Any]] = None  # the open basis and the direction of gravity
 
     def fill(self, gain: float) -> Pose:
-        """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces."""
+        """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces. Volumes that
+        lungs cannot hold are refused, as by `Basis.pose`."""
         if not np.isfinite(gain):
             raise ArgumentError(f"the gain is {gain}: give a finite number")
+        if self._made is not None:
+            owner, gravity = self._made
+            _c.basis_pose_gain(owner.pointer, gravity, gain, Pose())
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -155,11 +160,16 @@ def _address(array: Floats, count: int, name: str, writable: bool = True) -> int
 
 def _state(state: Gravity, volume: str = "") -> Any:
     """Convert a state to a C struct. The default posture is supine; the default volume is that of the basis."""
+    for text in (state, volume):
+        if isinstance(text, (int, float, np.number)):
+            raise ArgumentError(f"{text!r} has no unit and no reference: give a text such as '2600mL' or 'rest+500'")
     wanted = _c.State(_SUPINE)
     if isinstance(state, str):
         _c.state_parse(state.encode(), wanted)
     else:
         wanted.gravity = _numbers(state, 3, "gravity")
+    if not isinstance(volume, str):
+        raise ArgumentError(f"the volume is {type(volume).__name__}: give a text such as '2600mL' or 'rest+500'")
     if volume:
         other = _c.State()
         _c.state_parse_volume(volume.encode(), other)
@@ -292,8 +302,9 @@ class Basis:
         """Compute the pose of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
         `pose((0, 0.6, -0.8), "rest")`. The default volume is rest if the basis has a volume at rest. `out` is a
         pose to write into."""
-        out = Pose() if out is None else out
-        _c.basis_pose(self._c, _state(state, volume), out)
+        out, wanted = Pose() if out is None else out, _state(state, volume)
+        _c.basis_pose(self._c, wanted, out)
+        out._made = self._owner, wanted.gravity
         return out
 
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:

@@ -85,8 +85,10 @@ def _resting(to: _c.PrecomputeOptions, value: Any) -> None:
         if posture not in postures:
             raise _c.ArgumentError(f"resting: '{posture}' is not one of {', '.join(postures)}")
         rest, text = to.volumes.rest[postures.index(posture)], str(amount)
-        if text.endswith("mL"):
-            rest.ml = _number("resting", text[:-2], wants)
+        if text.lower().endswith("l"):
+            state = _c.State()
+            _c.state_parse_volume(text.encode(), state)
+            rest.ml = state.volume.ml
         else:
             for k, share in enumerate(text.split("/")[:2]):
                 rest.share[k] = _number("resting", share, wants)

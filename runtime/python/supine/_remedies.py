@@ -7,6 +7,7 @@ from __future__ import annotations
 WORDS = {
     "none": "",
     "basis_with_rest": ", or make the basis again, without scanned='none' and law='paper'",
+    "allow_folds": ", or open the basis with allow_folds=True",
     "locate_volume": ", or give volume",
     "axes": "; give the axes, for example axes='{}'",
     "axes_add": ": add axes='{}'",
