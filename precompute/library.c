@@ -144,6 +144,7 @@ typedef struct owned {
   supine_precompute_result result; /* first, so that its address is that of the struct */
   supine_bytes bytes;
   supine_arena memory;
+  supine_findings findings;
 } owned;
 
 /* The progress of one of the two steps: the lungs, and the basis. */
@@ -169,27 +170,6 @@ static const char *copy(supine_arena *memory, const char *text, size_t length) {
   }
   memcpy(made, text, length);
   return made;
-}
-
-/* List the findings: their text holds one in each line. */
-static void list_findings(const supine_findings *findings, owned *to) {
-  const char *at = findings->text;
-  size_t length;
-  const size_t count = findings->count;
-  supine_precompute_finding *list = supine_arena_zeros(&to->memory, count, sizeof *list);
-  if (list == NULL) {
-    return;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    const supine_advice *advice = &findings->advice[i];
-    const char *line = supine_findings_next(&at, &length);
-    list[i].text = copy(&to->memory, line, length);
-    list[i].is_warning = strstr(list[i].text, "warning: ") != NULL;
-    list[i].remedy = advice->remedy;
-    list[i].value = copy(&to->memory, advice->value, strlen(advice->value));
-  }
-  to->result.findings = list;
-  to->result.finding_count = count;
 }
 
 /* List the assumptions, which "; " separates. */
@@ -230,7 +210,7 @@ static supine_status make(const supine_precompute_options *options, owned *to,
     status = supine_precompute_make(&told, &prepared, &prepared.source.findings, &to->bytes,
                                     &to->result.report, error);
   }
-  list_findings(&prepared.source.findings, to);
+  to->findings = prepared.source.findings;
   SUPINE_TRY(status);
   to->result.bytes = to->bytes.data;
   to->result.size = to->bytes.size;
@@ -248,6 +228,7 @@ supine_status supine_precompute_basis(const supine_precompute_options *options,
     return supine_error_memory(error, "a basis");
   }
   *result = &to->result;
+  to->result.findings = &to->findings;
   SUPINE_REFUSE_IF(options->size < oldest, error, SUPINE_ERROR_ARGUMENT,
                    "the size of the options is %zu: set it to sizeof(supine_precompute_options)",
                    options->size);

@@ -101,9 +101,9 @@ static supine_status check_directions(const checking *c) {
       "directions. Simulate evenly spread directions, at least 8",
       c->name, gap, middle[0], middle[1], middle[2]);
   if (supine_input_judge(SUPINE_INPUT_FIELDS_GAP, gap) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(
+    supine_findings_warn(
         c->findings,
-        "%s: warning: the directions of gravity leave a gap: there is none within %.0f degrees of "
+        "%s: the directions of gravity leave a gap: there is none within %.0f degrees of "
         "%.2f,%.2f,%.2f (LPS). There, errors are several times the stated ones: simulate "
         "directions in the gap",
         c->name, gap, middle[0], middle[1], middle[2]);
@@ -193,10 +193,10 @@ static void check_sizes(const checking *c, const supine_fields_motion *motion) {
   size_t largest = 0;
   double second = 0.0;
   if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, motion->rms_mm) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(c->findings,
-                        "%s: warning: the displacements are small, %s mm RMS: are they in "
-                        "metres? Write them in the unit of the points",
-                        c->name, supine_text_distance(motion->rms_mm).text);
+    supine_findings_warn(c->findings,
+                         "%s: the displacements are small, %s mm RMS: are they in "
+                         "metres? Write them in the unit of the points",
+                         c->name, supine_text_distance(motion->rms_mm).text);
   }
   for (size_t run = 1; run < c->fields->run_count; ++run) {
     if (c->size[run] > c->size[largest]) {
@@ -209,11 +209,11 @@ static void check_sizes(const checking *c, const supine_fields_motion *motion) {
   if (c->size[largest] > 0.0 &&
       supine_input_judge(SUPINE_INPUT_FIELDS_RUN_SIZE, c->size[largest] / second) !=
           SUPINE_INPUT_TAKEN) {
-    supine_findings_add(c->findings,
-                        "%s: warning: row %zu: the displacement, %s mm RMS, is much larger than "
-                        "in all other rows, at most %s mm: check this run and its unit",
-                        c->name, largest, supine_text_distance(c->size[largest]).text,
-                        supine_text_distance(second).text);
+    supine_findings_warn(c->findings,
+                         "%s: row %zu: the displacement, %s mm RMS, is much larger than "
+                         "in all other rows, at most %s mm: check this run and its unit",
+                         c->name, largest, supine_text_distance(c->size[largest]).text,
+                         supine_text_distance(second).text);
   }
 }
 
@@ -275,19 +275,19 @@ supine_status supine_fields_check_fit(const char *name, const supine_fit_report 
       "are in the same order, or simulate more directions",
       name, 100.0 * part);
   if (verdict == SUPINE_INPUT_TOLD) {
-    supine_findings_add(
+    supine_findings_warn(
         findings,
-        "%s: warning: the directions of gravity hardly predict the displacements: runs that are "
+        "%s: the directions of gravity hardly predict the displacements: runs that are "
         "left out have an error of %.0f %% of what gravity changes. Check that the rows of gravity "
         "and displacement are in the same order, or simulate more directions",
         name, 100.0 * part);
   }
   if (bad_run) {
-    supine_findings_add(findings,
-                        "%s: warning: row %zu: the other rows predict its displacement with %.0f "
-                        "times the usual error: check the direction and the displacement of this "
-                        "run",
-                        name, report->worst_run, report->worst_error);
+    supine_findings_warn(findings,
+                         "%s: row %zu: the other rows predict its displacement with %.0f "
+                         "times the usual error: check the direction and the displacement of this "
+                         "run",
+                         name, report->worst_run, report->worst_error);
   }
   return SUPINE_OK;
 }
