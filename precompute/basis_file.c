@@ -231,11 +231,12 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
   if (prepared->assumed[0] != '\0') {
     add(list, "assumed", "%s", prepared->assumed);
   }
-  for (size_t i = 0; i < findings->count && told != NULL; ++i) {
+  const size_t count = told != NULL ? findings->count : 0;
+  for (size_t i = 0; i < count; ++i) {
     supine_text_add(told, room, "%s%s: %s", i > 0 ? "\n" : "",
                     findings->list[i].is_warning ? "warning" : "note", findings->list[i].text);
   }
-  if (told != NULL && told[0] != '\0') {
+  if (count > 0) {
     add(list, "warnings", "%s", told);
   }
   if (prepared->source.frame.millimetres_per_unit > 0.0) {

@@ -3,12 +3,15 @@
 #include <cblas.h>
 #include <gsl/gsl_errno.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/precompute.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/fields/check.h"
 #include "precompute/library.h"
 
@@ -83,6 +86,36 @@ static void report_fields(const supine_basis_report *made, const supine_fields_m
   memcpy(report->nearest_supine, motion->nearest, sizeof report->nearest_supine);
 }
 
+void supine_precompute_report_state(const supine_precompute_report *report, char *text,
+                                    size_t size) {
+  if (!report->rest_known) {
+    (void)supine_print_text(text, size, "%g mL", report->volume);
+  } else if (report->rest_part == 1.0) {
+    (void)snprintf(text, size, "rest");
+  } else {
+    (void)supine_print_text(text, size, "%g of the volume change from full to rest",
+                            report->rest_part);
+  }
+}
+
+/* Warn if the surface folds in one of six postures. */
+static void tell_folds(const supine_prepared *prepared, const supine_precompute_report *report,
+                       supine_findings *findings) {
+  char state[64];
+  if (supine_input_judge(SUPINE_INPUT_FOLDS, report->turned_over) == SUPINE_INPUT_TAKEN) {
+    return;
+  }
+  supine_precompute_report_state(report, state, sizeof state);
+  supine_findings_warn(
+      findings,
+      "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six postures: "
+      "%s",
+      100.0 * report->turned_over, state,
+      prepared->model.reach == 0.0
+          ? "forces spread over a few mesh links, however short: give a reach, such as 10 mm"
+          : "lower the gain, or give a longer reach");
+}
+
 supine_status supine_precompute_make(const supine_precompute_options *options,
                                      const supine_prepared *prepared, supine_findings *findings,
                                      supine_bytes *bytes, supine_precompute_report *report,
@@ -106,6 +139,8 @@ supine_status supine_precompute_make(const supine_precompute_options *options,
   if (options->fields != NULL) {
     SUPINE_TRY(supine_fields_check_fit(options->fields, &made.fit, findings, error));
     report_fields(&made, &motion, report);
+  } else {
+    tell_folds(prepared, report, findings);
   }
   return SUPINE_OK;
 }
