@@ -1,50 +1,49 @@
 /* SPDX-License-Identifier: MIT */
-/* Collect warnings and notes about an input. */
+/* Collect what checks tell about an input. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "base/findings.h"
-#include "base/number.h"
-#include "base/text.h"
+#include <supine/findings.h>
 
-static void add(supine_findings *findings, supine_remedy remedy, const char *value,
-                const char *format, va_list arguments) {
-  const size_t used = strlen(findings->text);
-  const size_t room = sizeof findings->text - used;
-  const int length = supine_print_text_list(findings->text + used, room, format, arguments);
-  if (length < 0 || (size_t)length + 1 >= room || findings->count == SUPINE_FINDINGS_MAX) {
-    findings->text[used] = '\0';
+#include "base/number.h"
+#include "base/utf8.h"
+
+static void add(supine_findings *findings, bool is_warning, const char *format, va_list arguments) {
+  char text[SUPINE_FINDING_TEXT_MAX];
+  if (findings == NULL) {
     return;
   }
-  for (char *c = findings->text + used; *c != '\0'; ++c) { /* replace line feeds of file names */
-    *c = *c == '\n' ? ' ' : *c;
+  if (findings->count == SUPINE_FINDINGS_MAX) {
+    ++findings->dropped;
+    return;
   }
-  (void)supine_text_make_utf8(findings->text + used);
-  (void)strcat(findings->text, "\n");
-  supine_advice *advice = &findings->advice[findings->count++];
-  advice->remedy = remedy;
-  (void)snprintf(advice->value, sizeof advice->value, "%s", value != NULL ? value : "");
+  supine_finding *added = &findings->list[findings->count++];
+  (void)supine_print_text_list(text, sizeof text, format, arguments);
+  supine_utf8_escape(text, "", added->text, sizeof added->text);
+  added->is_warning = is_warning;
+  added->remedy = SUPINE_REMEDY_NONE;
+  added->value[0] = '\0';
 }
 
-void supine_findings_add(supine_findings *findings, const char *format, ...) {
+void supine_findings_warn(supine_findings *findings, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  add(findings, SUPINE_REMEDY_NONE, NULL, format, arguments);
+  add(findings, true, format, arguments);
   va_end(arguments);
 }
 
-void supine_findings_advise(supine_findings *findings, supine_remedy remedy, const char *value,
-                            const char *format, ...) {
+void supine_findings_note(supine_findings *findings, const char *format, ...) {
   va_list arguments;
   va_start(arguments, format);
-  add(findings, remedy, value, format, arguments);
+  add(findings, false, format, arguments);
   va_end(arguments);
 }
 
-const char *supine_findings_next(const char **at, size_t *length) {
-  const char *line = *at;
-  *length = strcspn(line, "\n");
-  *at = line + *length + (line[*length] == '\n' ? 1 : 0);
-  return *line != '\0' ? line : NULL;
+void supine_findings_advise(supine_findings *findings, supine_remedy remedy, const char *value) {
+  if (findings != NULL && findings->count > 0 && findings->dropped == 0) {
+    supine_finding *last = &findings->list[findings->count - 1];
+    last->remedy = remedy;
+    (void)snprintf(last->value, sizeof last->value, "%s", value != NULL ? value : "");
+  }
 }

@@ -218,7 +218,9 @@ static void add_normals(entries *list, const supine_normals_modes *normals, bool
 }
 
 static void add_texts(entries *list, const supine_prepared *prepared) {
-  const char *findings = prepared->source.findings.text;
+  const supine_findings *findings = &prepared->source.findings;
+  const size_t room = SUPINE_FINDINGS_MAX * (SUPINE_FINDING_TEXT_MAX + sizeof "warning: \n");
+  char *told = supine_arena_zeros(list->memory, room, 1);
   if (prepared->patient != NULL) {
     char *law = supine_patient_text(prepared->patient, NULL);
     list->memory->failed |= law == NULL;
@@ -229,8 +231,13 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
   if (prepared->assumed[0] != '\0') {
     add(list, "assumed", "%s", prepared->assumed);
   }
-  if (findings[0] != '\0') {
-    add(list, "warnings", "%.*s", (int)strlen(findings) - 1, findings);
+  const size_t count = told != NULL ? findings->count : 0;
+  for (size_t i = 0; i < count; ++i) {
+    supine_text_add(told, room, "%s%s: %s", i > 0 ? "\n" : "",
+                    findings->list[i].is_warning ? "warning" : "note", findings->list[i].text);
+  }
+  if (count > 0) {
+    add(list, "warnings", "%s", told);
   }
   if (prepared->source.frame.millimetres_per_unit > 0.0) {
     char letters[4];

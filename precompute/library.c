@@ -3,12 +3,15 @@
 #include <cblas.h>
 #include <gsl/gsl_errno.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/inputs.h>
 #include <supine/precompute.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "precompute/fields/check.h"
 #include "precompute/library.h"
 
@@ -83,6 +86,36 @@ static void report_fields(const supine_basis_report *made, const supine_fields_m
   memcpy(report->nearest_supine, motion->nearest, sizeof report->nearest_supine);
 }
 
+void supine_precompute_report_state(const supine_precompute_report *report, char *text,
+                                    size_t size) {
+  if (!report->rest_known) {
+    (void)supine_print_text(text, size, "%g mL", report->volume);
+  } else if (report->rest_part == 1.0) {
+    (void)snprintf(text, size, "rest");
+  } else {
+    (void)supine_print_text(text, size, "%g of the volume change from full to rest",
+                            report->rest_part);
+  }
+}
+
+/* Warn if the surface folds in one of six postures. */
+static void tell_folds(const supine_prepared *prepared, const supine_precompute_report *report,
+                       supine_findings *findings) {
+  char state[64];
+  if (supine_input_judge(SUPINE_INPUT_FOLDS, report->turned_over) == SUPINE_INPUT_TAKEN) {
+    return;
+  }
+  supine_precompute_report_state(report, state, sizeof state);
+  supine_findings_warn(
+      findings,
+      "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six postures: "
+      "%s",
+      100.0 * report->turned_over, state,
+      prepared->model.reach == 0.0
+          ? "forces spread over a few mesh links, however short: give a reach, such as 10 mm"
+          : "lower the gain, or give a longer reach");
+}
+
 supine_status supine_precompute_make(const supine_precompute_options *options,
                                      const supine_prepared *prepared, supine_findings *findings,
                                      supine_bytes *bytes, supine_precompute_report *report,
@@ -106,6 +139,8 @@ supine_status supine_precompute_make(const supine_precompute_options *options,
   if (options->fields != NULL) {
     SUPINE_TRY(supine_fields_check_fit(options->fields, &made.fit, findings, error));
     report_fields(&made, &motion, report);
+  } else {
+    tell_folds(prepared, report, findings);
   }
   return SUPINE_OK;
 }
@@ -144,6 +179,7 @@ typedef struct owned {
   supine_precompute_result result; /* first, so that its address is that of the struct */
   supine_bytes bytes;
   supine_arena memory;
+  supine_findings findings;
 } owned;
 
 /* The progress of one of the two steps: the lungs, and the basis. */
@@ -169,27 +205,6 @@ static const char *copy(supine_arena *memory, const char *text, size_t length) {
   }
   memcpy(made, text, length);
   return made;
-}
-
-/* List the findings: their text holds one in each line. */
-static void list_findings(const supine_findings *findings, owned *to) {
-  const char *at = findings->text;
-  size_t length;
-  const size_t count = findings->count;
-  supine_precompute_finding *list = supine_arena_zeros(&to->memory, count, sizeof *list);
-  if (list == NULL) {
-    return;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    const supine_advice *advice = &findings->advice[i];
-    const char *line = supine_findings_next(&at, &length);
-    list[i].text = copy(&to->memory, line, length);
-    list[i].is_warning = strstr(list[i].text, "warning: ") != NULL;
-    list[i].remedy = advice->remedy;
-    list[i].value = copy(&to->memory, advice->value, strlen(advice->value));
-  }
-  to->result.findings = list;
-  to->result.finding_count = count;
 }
 
 /* List the assumptions, which "; " separates. */
@@ -230,7 +245,7 @@ static supine_status make(const supine_precompute_options *options, owned *to,
     status = supine_precompute_make(&told, &prepared, &prepared.source.findings, &to->bytes,
                                     &to->result.report, error);
   }
-  list_findings(&prepared.source.findings, to);
+  to->findings = prepared.source.findings;
   SUPINE_TRY(status);
   to->result.bytes = to->bytes.data;
   to->result.size = to->bytes.size;
@@ -248,6 +263,7 @@ supine_status supine_precompute_basis(const supine_precompute_options *options,
     return supine_error_memory(error, "a basis");
   }
   *result = &to->result;
+  to->result.findings = &to->findings;
   SUPINE_REFUSE_IF(options->size < oldest, error, SUPINE_ERROR_ARGUMENT,
                    "the size of the options is %zu: set it to sizeof(supine_precompute_options)",
                    options->size);

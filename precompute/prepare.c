@@ -78,22 +78,23 @@ static supine_status choose_law(const supine_precompute_options *options, supine
 static void tell_volume(const supine_patient_record *record, supine_findings *findings) {
   char text[512];
   const bool doubted = supine_patient_describe_volume(record, text, sizeof text);
-  supine_findings_advise(findings, doubted ? SUPINE_REMEDY_FIT_LANDMARKS : SUPINE_REMEDY_NONE, NULL,
-                         "%s: %s", doubted ? "warning" : "note", text);
+  if (doubted) {
+    supine_findings_warn(findings, "%s", text);
+    supine_findings_advise(findings, SUPINE_REMEDY_FIT_LANDMARKS, NULL);
+  } else {
+    supine_findings_note(findings, "%s", text);
+  }
 }
 
 /* Say if the lungs have another size than in the scan of this state when the law was fitted. */
 static void tell_size(const supine_patient_record *fitted, size_t state, const supine_lungs *lungs,
                       supine_findings *findings) {
-  char text[256];
   const supine_patient_frame *frame = &fitted->patient.frame;
   const double *low = state == 0 ? frame->minimum : fitted->emptier[0];
   const double *high = state == 0 ? frame->maximum : fitted->emptier[1];
   const bool both = lungs->lung_count == 2 && frame->only_side == 0;
-  if (both && fitted->from_surface &&
-      !supine_patient_same_size(lungs, low, high, fitted->volume[state], text, sizeof text)) {
-    supine_findings_add(
-        findings, "warning: %s: check that the file of the patient was fitted to this scan", text);
+  if (both && fitted->from_surface) {
+    supine_patient_check_size(lungs, low, high, fitted->volume[state], findings);
   }
 }
 
@@ -133,9 +134,9 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
 static supine_status assume_fitted_state(const supine_patient_record *record,
                                          const supine_scan *scan, supine_findings *findings,
                                          supine_error *error) {
-  supine_findings_advise(findings, SUPINE_REMEDY_SCAN_ASSUMED, NULL,
-                         "note: the scan is assumed to be the %s of the two that were fitted",
-                         record->shown == 0 ? "fuller" : "emptier");
+  supine_findings_note(findings, "the scan is assumed to be the %s of the two that were fitted",
+                       record->shown == 0 ? "fuller" : "emptier");
+  supine_findings_advise(findings, SUPINE_REMEDY_SCAN_ASSUMED, NULL);
   SUPINE_REFUSE_ADVISE(record->shown == 1 && !scan->known, error, SUPINE_REMEDY_SCAN_GIVE,
                        SUPINE_ERROR_ARGUMENT,
                        "this scan is the emptier of the two that were fitted, and how far it is "
@@ -206,9 +207,9 @@ static void warn_of_lesion(const supine_lungs *lungs, const supine_lesion *lesio
   for (size_t i = 0; i < 3 * lungs->mesh.vertex_count; i += 3) {
     nearest = fmin(nearest, supine_distance(lungs->mesh.vertices + i, c));
   }
-  supine_findings_add(
+  supine_findings_warn(
       findings,
-      "warning: the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the surface: with a "
+      "the lesion at %g,%g,%g is %.0f mm from the nearest vertex of the surface: with a "
       "radius of %g mm it changes nothing: correct its centre or radius",
       c[0], c[1], c[2], nearest, lesion->radius);
 }
@@ -511,11 +512,11 @@ static supine_status check_height(const knowledge *known, const supine_resting *
       height != 0.0 && !(height >= least && height <= most), error, SUPINE_ERROR_ARGUMENT,
       "the height is %g cm: give %g to %g cm, such as 175 (1.75 m)", height, least, most);
   if (supine_physics_reference_height_is_told(&known->person, range)) {
-    supine_findings_add(&p->source.findings,
-                        "warning: the height of %g cm is outside the %.0f to %.0f cm of the adults "
-                        "for whom the equations are stated: give the volume at rest or at full "
-                        "inflation",
-                        known->person.height, range[0], range[1]);
+    supine_findings_warn(&p->source.findings,
+                         "the height of %g cm is outside the %.0f to %.0f cm of the adults "
+                         "for whom the equations are stated: give the volume at rest or at full "
+                         "inflation",
+                         known->person.height, range[0], range[1]);
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     full += lungs->volume[lung];

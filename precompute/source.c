@@ -48,10 +48,10 @@ static void load_range(void *context, size_t begin, size_t end, size_t thread) {
 static void note_mesh(const char *path, const supine_mesh_report *report,
                       supine_findings *findings) {
   if (report->degenerate_faces > 0 || report->unreferenced_vertices > 0) {
-    supine_findings_add(
-        findings, "%s: note: dropped %zu degenerate face%s and %zu unreferenced vert%s", path,
-        report->degenerate_faces, report->degenerate_faces == 1 ? "" : "s",
-        report->unreferenced_vertices, report->unreferenced_vertices == 1 ? "ex" : "ices");
+    supine_findings_note(findings, "%s: dropped %zu degenerate face%s and %zu unreferenced vert%s",
+                         path, report->degenerate_faces, report->degenerate_faces == 1 ? "" : "s",
+                         report->unreferenced_vertices,
+                         report->unreferenced_vertices == 1 ? "ex" : "ices");
   }
 }
 
@@ -69,35 +69,33 @@ static supine_status load_meshes(reading *r, supine_source *source, supine_error
 
 static void note_map(const char *path, const supine_labels_report *report,
                      supine_findings *findings) {
-  char text[512];
   if (report->frames_differ) {
-    supine_findings_add(
-        findings,
-        "%s: warning: its qform and sform do not agree; the sform was used: check the positions",
+    supine_findings_warn(
+        findings, "%s: its qform and sform do not agree; the sform was used: check the positions",
         path);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
     const char *side = lung->side > 0 ? "left" : "right";
     if (lung->cut) {
-      supine_findings_add(findings,
-                          "%s: warning: the %s lung is cut off at the image's border: give a scan "
-                          "that shows all of it",
-                          path, side);
+      supine_findings_warn(findings,
+                           "%s: the %s lung is cut off at the image's border: give a scan "
+                           "that shows all of it",
+                           path, side);
     }
     if (supine_input_judge(SUPINE_INPUT_LUNG_PIECES, lung->dropped / lung->mask) !=
         SUPINE_INPUT_TAKEN) {
-      (void)supine_print_text(text, sizeof text,
-                              "%s: warning: the %s lung is %.0f mL, without %.0f mL that are not "
-                              "connected to it: check the labels",
-                              path, side, lung->mask, lung->dropped);
-      supine_findings_add(findings, "%s", text);
+      supine_findings_warn(findings,
+                           "%s: the %s lung is %.0f mL, without %.0f mL that are not connected to "
+                           "it: check the labels",
+                           path, side, lung->mask, lung->dropped);
     }
     if (lung->tunnels > 0) {
-      supine_findings_advise(findings, SUPINE_REMEDY_CLOSE, NULL,
-                             "%s: note: %s lung: %ld open channel%s (a hole through the mask, or a "
-                             "hollow open to the outside)",
-                             path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
+      supine_findings_note(findings,
+                           "%s: %s lung: %ld open channel%s (a hole through the mask, or a "
+                           "hollow open to the outside)",
+                           path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
+      supine_findings_advise(findings, SUPINE_REMEDY_CLOSE, NULL);
     }
   }
 }
@@ -156,9 +154,9 @@ static void summarize(const reading *r, supine_source *source) {
   char letters[4];
   supine_mesh_axes_letters(load->axes != SUPINE_AXES_AUTO ? load->axes : report->axes, letters);
   if (strcmp(letters, "RAI") == 0) {
-    supine_findings_add(&source->findings,
-                        "note: the axes RAI grow to the right, front and feet; what ITK calls RAI "
-                        "is LPS here");
+    supine_findings_note(&source->findings,
+                         "the axes RAI grow to the right, front and feet; what ITK calls RAI "
+                         "is LPS here");
   }
   const char *axes_from = report->axes_from_tag ? "the file's tag" : "assumed";
   if (load->axes != SUPINE_AXES_AUTO) {

@@ -6,7 +6,7 @@
 
 #include <supine/precompute.h>
 
-#include "base/findings.h"
+#include <supine/findings.h>
 
 #include "mesh/labels/labels.h"
 #include "precompute/lungs/lungs.h"

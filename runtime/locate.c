@@ -477,26 +477,22 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
   return status;
 }
 
-bool supine_location_doubt(const supine_location_info *found, char *text, size_t size) {
+void supine_location_check(const supine_location_info *found, supine_findings *findings) {
   const double expected = found->residual_expected;
   const double ratio = expected > 0 ? found->residual_rms / expected : 0;
   const double degrees = found->turn * (180 / 3.14159265358979);
   if (supine_input_judge(SUPINE_INPUT_LOCATE_TURNED, degrees) != SUPINE_INPUT_TAKEN) {
-    (void)supine_print_text(text, size,
-                            "the points fit much better when turned by %.0f degrees: let their "
-                            "frame turn",
-                            degrees);
-    return true;
+    supine_findings_warn(findings,
+                         "the points fit much better when turned by %.0f degrees: let their frame "
+                         "turn",
+                         degrees);
+  } else if (supine_input_judge(SUPINE_INPUT_LOCATE_RESIDUALS, ratio) != SUPINE_INPUT_TAKEN) {
+    supine_findings_warn(findings,
+                         "the points differ from their predictions by the others by %.1f mm (RMS), "
+                         "where %.1f mm are expected: check the volume, the posture, and the names "
+                         "of the points",
+                         found->residual_rms, expected);
   }
-  if (supine_input_judge(SUPINE_INPUT_LOCATE_RESIDUALS, ratio) != SUPINE_INPUT_TAKEN) {
-    (void)supine_print_text(text, size,
-                            "the points differ from their predictions by the others by %.1f mm "
-                            "(RMS), where %.1f mm are expected: check the volume, the posture, and "
-                            "the names of the points",
-                            found->residual_rms, expected);
-    return true;
-  }
-  return false;
 }
 
 supine_status supine_locate(const supine_locate_task *task, supine_locate_residual *residuals,

@@ -14,8 +14,8 @@ static int progress(void *context, double fraction) {
 
 /* Print what was found in the surfaces, what was assumed, and the error of the basis. */
 static void print(const supine_precompute_result *result) {
-  for (size_t i = 0; i < result->finding_count; ++i) {
-    const supine_precompute_finding *finding = &result->findings[i];
+  for (size_t i = 0; i < result->findings->count; ++i) {
+    const supine_finding *finding = &result->findings->list[i];
     fprintf(stderr, "%s: %s\n", finding->is_warning ? "warning" : "note", finding->text);
   }
   for (size_t i = 0; i < result->assumption_count; ++i) {

@@ -103,9 +103,9 @@ static supine_status check_directions(const checking *c) {
       "directions. Simulate evenly spread directions, at least 8",
       c->name, gap, middle[0], middle[1], middle[2]);
   if (supine_input_judge(SUPINE_INPUT_FIELDS_GAP, gap) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(
+    supine_findings_warn(
         c->findings,
-        "%s: warning: the directions of gravity leave a gap: there is none within %.0f degrees of "
+        "%s: the directions of gravity leave a gap: there is none within %.0f degrees of "
         "%.2f,%.2f,%.2f (LPS). There, errors are several times the stated ones: simulate "
         "directions in the gap",
         c->name, gap, middle[0], middle[1], middle[2]);
@@ -205,11 +205,11 @@ static void check_sizes(const checking *c) {
   if (c->size[largest] > 0.0 &&
       supine_input_judge(SUPINE_INPUT_FIELDS_RUN_SIZE, c->size[largest] / second) !=
           SUPINE_INPUT_TAKEN) {
-    supine_findings_add(c->findings,
-                        "%s: warning: row %zu: the displacement, %s mm RMS, is much larger than "
-                        "in all other rows, at most %s mm: check this run and its unit",
-                        c->name, largest, supine_text_distance(c->size[largest]).text,
-                        supine_text_distance(second).text);
+    supine_findings_warn(c->findings,
+                         "%s: row %zu: the displacement, %s mm RMS, is much larger than "
+                         "in all other rows, at most %s mm: check this run and its unit",
+                         c->name, largest, supine_text_distance(c->size[largest]).text,
+                         supine_text_distance(second).text);
   }
 }
 
@@ -226,10 +226,10 @@ static void check_copies(const checking *c) {
     }
     if (other < run &&
         supine_input_judge(SUPINE_INPUT_FIELDS_COPY, c->size[run] > 0.0) != SUPINE_INPUT_TAKEN) {
-      supine_findings_add(c->findings,
-                          "%s: warning: rows %zu and %zu have exactly the same displacements: one "
-                          "of these runs may be a copy. Check both, or leave one out",
-                          c->name, other, run);
+      supine_findings_warn(c->findings,
+                           "%s: rows %zu and %zu have exactly the same displacements: one "
+                           "of these runs may be a copy. Check both, or leave one out",
+                           c->name, other, run);
     }
   }
 }
@@ -240,11 +240,11 @@ static supine_status check_nodes(const checking *c, const supine_fields_motion *
   SUPINE_TRY(supine_fields_find_stray(c->fields, c->lungs, motion->rms_mm, &found));
   if (supine_input_judge(SUPINE_INPUT_FIELDS_NODE, found.ratio) != SUPINE_INPUT_TAKEN) {
     const double *v = c->lungs->mesh.vertices + 3 * found.vertex;
-    supine_findings_add(c->findings,
-                        "%s: warning: row %zu: the point at %.1f,%.1f,%.1f mm (LPS) is displaced "
-                        "by %s mm more than its neighbours: check this node of the simulation",
-                        c->name, found.run, v[0], v[1], v[2],
-                        supine_text_distance(found.apart_mm).text);
+    supine_findings_warn(c->findings,
+                         "%s: row %zu: the point at %.1f,%.1f,%.1f mm (LPS) is displaced "
+                         "by %s mm more than its neighbours: check this node of the simulation",
+                         c->name, found.run, v[0], v[1], v[2],
+                         supine_text_distance(found.apart_mm).text);
   }
   return SUPINE_OK;
 }
@@ -298,19 +298,20 @@ static double left_out(const supine_fit_report *report) {
 static void check_runs(const char *name, const supine_fit_report *report,
                        supine_findings *findings) {
   if (supine_input_judge(SUPINE_INPUT_FIELDS_ZERO, report->zero.ratio) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(findings,
-                        "%s: warning: row %zu: all displacements are 0, but the other rows predict "
-                        "%.0f %% of the RMS displacement: check whether this run has ended",
-                        name, report->zero.run, 100.0 * report->zero.part);
+    supine_findings_warn(findings,
+                         "%s: row %zu: all displacements are 0, but the other rows predict "
+                         "%.0f %% of the RMS displacement: check whether this run has ended",
+                         name, report->zero.run, 100.0 * report->zero.part);
   }
   for (size_t i = 0; i < report->suspect_count; ++i) {
     const supine_fit_suspect *suspect = &report->suspects[i];
     if (supine_input_judge(SUPINE_INPUT_FIELDS_RUN_ERROR, suspect->ratio) != SUPINE_INPUT_TAKEN) {
-      supine_findings_add(findings,
-                          "%s: warning: row %zu: the other rows predict its displacement with %.0f "
-                          "times the usual error: check the direction and the displacement of this "
-                          "run",
-                          name, suspect->run, suspect->ratio);
+      supine_findings_warn(
+          findings,
+          "%s: row %zu: the other rows predict its displacement with %.0f "
+          "times the usual error: check the direction and the displacement of this "
+          "run",
+          name, suspect->run, suspect->ratio);
     }
   }
 }
@@ -321,26 +322,26 @@ static void check_motion(const char *name, const supine_fit_frame *frame,
   static const char *const axes[] = {"-z", "-y", "-x", "", "x", "y", "z"};
   const supine_distance_text moved = supine_text_distance(frame->moved_mm);
   if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, frame->moved_mm) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(findings,
-                        "%s: warning: gravity moves the lungs by %s mm RMS only: are the "
-                        "displacements in metres or centimetres? Write them in the unit of the "
-                        "points",
-                        name, moved.text);
+    supine_findings_warn(findings,
+                         "%s: gravity moves the lungs by %s mm RMS only: are the "
+                         "displacements in metres or centimetres? Write them in the unit of the "
+                         "points",
+                         name, moved.text);
   }
   if (supine_input_judge(SUPINE_INPUT_FIELDS_LARGE, frame->moved_mm) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(findings,
-                        "%s: warning: gravity moves the lungs by %s mm RMS, more than it moves "
-                        "those of people: check the unit of the displacements, and the stiffness "
-                        "and the density of the tissue",
-                        name, moved.text);
+    supine_findings_warn(findings,
+                         "%s: gravity moves the lungs by %s mm RMS, more than it moves "
+                         "those of people: check the unit of the displacements, and the stiffness "
+                         "and the density of the tissue",
+                         name, moved.text);
   }
   if (supine_input_judge(SUPINE_INPUT_FIELDS_FRAME, frame->gain) != SUPINE_INPUT_TAKEN) {
-    supine_findings_add(findings,
-                        "%s: warning: the lungs do not sag along gravity. Displacements along "
-                        "x, y and z follow %s, %s and %s of gravity: check that both have the axes "
-                        "of the surface, and that gravity points to where things fall",
-                        name, axes[frame->axis[0] + 3], axes[frame->axis[1] + 3],
-                        axes[frame->axis[2] + 3]);
+    supine_findings_warn(
+        findings,
+        "%s: the lungs do not sag along gravity. Displacements along "
+        "x, y and z follow %s, %s and %s of gravity: check that both have the axes "
+        "of the surface, and that gravity points to where things fall",
+        name, axes[frame->axis[0] + 3], axes[frame->axis[1] + 3], axes[frame->axis[2] + 3]);
   }
 }
 
@@ -359,9 +360,9 @@ supine_status supine_fields_check_fit(const char *name, const supine_fit_report 
       "with; or simulate more directions",
       name, 100.0 * part);
   if (verdict == SUPINE_INPUT_TOLD) {
-    supine_findings_add(
+    supine_findings_warn(
         findings,
-        "%s: warning: the directions of gravity hardly predict the displacements: runs that are "
+        "%s: the directions of gravity hardly predict the displacements: runs that are "
         "left out have an error of %.0f %% of what gravity changes. Check that the rows of gravity "
         "and displacement are in the same order, or simulate more directions",
         name, 100.0 * part);

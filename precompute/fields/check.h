@@ -5,8 +5,8 @@
 #ifndef SUPINE_FIELDS_CHECK_H
 #define SUPINE_FIELDS_CHECK_H
 
-#include "base/findings.h"
 #include "precompute/fields/fields.h"
+#include <supine/findings.h>
 
 /** How large the displacements of fields are. */
 typedef struct supine_fields_motion {

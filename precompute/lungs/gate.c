@@ -55,8 +55,8 @@ static supine_status join_vertices(supine_mesh *mesh, const char *name, supine_f
   }
   SUPINE_TRY(supine_mesh_join_close(mesh, rounding, &joined));
   if (joined > 0) {
-    supine_findings_add(findings, "%s: note: joined %zu %s within 0.0001 mm of another", name,
-                        joined, joined == 1 ? "vertex" : "vertices");
+    supine_findings_note(findings, "%s: joined %zu %s within 0.0001 mm of another", name, joined,
+                         joined == 1 ? "vertex" : "vertices");
   }
   return SUPINE_OK;
 }
@@ -83,20 +83,19 @@ static supine_status mend(supine_mesh *mesh, const char *name, supine_findings *
   };
   for (size_t i = 0; i < sizeof notes / sizeof *notes; ++i) {
     if (notes[i].count > 0) {
-      supine_findings_add(findings, "%s: note: %s %zu %s%s%s", name, notes[i].done, notes[i].count,
-                          notes[i].noun, plural(notes[i].count), notes[i].more);
+      supine_findings_note(findings, "%s: %s %zu %s%s%s", name, notes[i].done, notes[i].count,
+                           notes[i].noun, plural(notes[i].count), notes[i].more);
     }
   }
   if (specks > 0) {
-    supine_findings_add(
+    supine_findings_note(
         findings,
-        "%s: note: dropped %zu small component%s, each below %g %% of the volume; %zu component%s",
-        name, specks, plural(specks), 100.0 * speck_share, pieces,
-        pieces == 1 ? " remains" : "s remain");
+        "%s: dropped %zu small component%s, each below %g %% of the volume; %zu component%s", name,
+        specks, plural(specks), 100.0 * speck_share, pieces, pieces == 1 ? " remains" : "s remain");
   }
   if (pieces > 6) { /* five lobes and one other piece are plausible */
-    supine_findings_add(findings, "%s: warning: %zu components; remove those that are not lung",
-                        name, pieces);
+    supine_findings_warn(findings, "%s: %zu components; remove those that are not lung", name,
+                         pieces);
   }
   return SUPINE_OK;
 }
@@ -125,7 +124,8 @@ static void check(checks *c, bool holds, supine_status refuse, supine_remedy rem
     c->status = supine_error_set(c->error, refuse, "%s: %s", c->source->name, text);
     supine_error_advise(c->error, remedy, value);
   } else {
-    supine_findings_advise(c->findings, remedy, value, "%s: warning: %s", c->source->name, text);
+    supine_findings_warn(c->findings, "%s: %s", c->source->name, text);
+    supine_findings_advise(c->findings, remedy, value);
   }
 }
 
@@ -442,9 +442,9 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
     char other_midline[SUPINE_REMEDY_VALUE_MAX];
     (void)supine_print_text(other_midline, sizeof other_midline, "%.0f",
                             taken > 0 ? ceil(high) : floor(low));
-    supine_findings_advise(findings, SUPINE_REMEDY_MIDLINE, other_midline,
-                           "%s: note: one lung, taken for the %s lung by its %s", source->name,
-                           taken > 0 ? "left" : "right", side != 0 ? "shape" : "place");
+    supine_findings_note(findings, "%s: one lung, taken for the %s lung by its %s", source->name,
+                         taken > 0 ? "left" : "right", side != 0 ? "shape" : "place");
+    supine_findings_advise(findings, SUPINE_REMEDY_MIDLINE, other_midline);
   }
   if (taken == lungs->side[0] && lungs->midline == midline) {
     return SUPINE_OK;
@@ -477,9 +477,8 @@ supine_status supine_lungs_gate(supine_mesh *meshes, size_t count,
   }
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (lungs->reversed[lung]) {
-      supine_findings_add(findings,
-                          "%s: note: the triangles of the %s lung faced inwards: reversed",
-                          source->name, supine_lungs_name(lungs, lung));
+      supine_findings_note(findings, "%s: the triangles of the %s lung faced inwards: reversed",
+                           source->name, supine_lungs_name(lungs, lung));
     }
   }
   return c.status;

@@ -4,7 +4,7 @@
 #ifndef SUPINE_LUNGS_GATE_H
 #define SUPINE_LUNGS_GATE_H
 
-#include "base/findings.h"
+#include <supine/findings.h>
 
 #include "precompute/lungs/lungs.h"
 

@@ -33,8 +33,8 @@ static bool is_told(supine_input_id id, double measured) {
   return supine_input_judge(id, measured) != SUPINE_INPUT_TAKEN;
 }
 
-bool supine_patient_one_person(const supine_patient_size *first, const supine_patient_size *second,
-                               char *text, size_t text_size) {
+void supine_patient_check_person(const supine_patient_size *first,
+                                 const supine_patient_size *second, supine_findings *findings) {
   const bool ordered = first->volume >= second->volume;
   const supine_patient_size *fuller = ordered ? first : second;
   const supine_patient_size *emptier = ordered ? second : first;
@@ -52,25 +52,23 @@ bool supine_patient_one_person(const supine_patient_size *first, const supine_pa
   for (size_t i = 0; i < sizeof measures / sizeof *measures; ++i) {
     const double measured = measures[i].measured;
     if (is_told(measures[i].least, measured) || is_told(measures[i].most, measured)) {
-      (void)supine_print_text(
-          text, text_size,
-          "warning: the lungs are %.0f %% %s in the emptier scan, but one person's keep %.0f to "
+      supine_findings_warn(
+          findings,
+          "the lungs are %.0f %% %s in the emptier scan, but one person's keep %.0f to "
           "%.0f %% of their %s: are both scans of one person?",
           100.0 * fabs(measured - 1.0), measured < 1.0 ? measures[i].less : measures[i].more,
           100.0 * supine_input_get(measures[i].least)->told,
           100.0 * supine_input_get(measures[i].most)->told, measures[i].measure);
-      return false;
+      return;
     }
   }
   if (is_told(SUPINE_INPUT_PERSON_LEFT_LEAST, left) ||
       is_told(SUPINE_INPUT_PERSON_LEFT_MOST, left)) {
-    (void)supine_print_text(text, text_size,
-                            "warning: the left lung holds %.0f %% of the volume in the fuller "
-                            "scan, but %.0f %% in the emptier one: are both scans of one person?",
-                            100.0 * fuller->left, 100.0 * emptier->left);
-    return false;
+    supine_findings_warn(findings,
+                         "the left lung holds %.0f %% of the volume in the fuller "
+                         "scan, but %.0f %% in the emptier one: are both scans of one person?",
+                         100.0 * fuller->left, 100.0 * emptier->left);
   }
-  return true;
 }
 
 /* Return the logarithm of the growth without the pairs of a group (GROUPS: of all pairs).
@@ -179,13 +177,12 @@ static void drop_marked(supine_patient_pairs *pairs, const double *difference, d
   pairs->count = kept;
 }
 
-supine_status supine_patient_drop_mismatched(supine_patient_pairs *pairs, char *text,
-                                             size_t text_size, size_t *dropped,
-                                             supine_error *error) {
+supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pairs *pairs,
+                                             supine_findings *findings, supine_error *error) {
   const size_t n = pairs->count;
+  size_t dropped = 0;
+  char rows[256] = "";
   SUPINE_ARENA arena = {0};
-  text[0] = '\0';
-  *dropped = 0;
   if (n < PAIRS_LEAST) {
     return SUPINE_OK;
   }
@@ -198,22 +195,21 @@ supine_status supine_patient_drop_mismatched(supine_patient_pairs *pairs, char *
   const double most =
       fmax(difference_least, supine_input_get(SUPINE_INPUT_LANDMARKS_MATCH)->told * usual);
   for (size_t i = 0; i < n; ++i) {
-    *dropped += difference[i] > most;
+    dropped += difference[i] > most;
   }
-  if (*dropped == 0 || (double)*dropped > dropped_most * (double)n) {
-    *dropped = 0;
+  if (dropped == 0 || (double)dropped > dropped_most * (double)n) {
     return SUPINE_OK;
   }
-  (void)supine_print_text(text, text_size,
-                          "warning: %zu of %zu pairs of landmarks move otherwise than their "
-                          "neighbours by more than %.0f mm, and are left out; check these rows: ",
-                          *dropped, n, most);
-  drop_marked(pairs, difference, most, text, text_size);
+  drop_marked(pairs, difference, most, rows, sizeof rows);
+  supine_findings_warn(findings,
+                       "%s: %zu of %zu pairs of landmarks move otherwise than their neighbours by "
+                       "more than %.0f mm, and are left out; check these rows: %s",
+                       name, dropped, n, most, rows);
   return SUPINE_OK;
 }
 
-bool supine_patient_same_size(const supine_lungs *lungs, const double low[3], const double high[3],
-                              double volume, char *text, size_t text_size) {
+void supine_patient_check_size(const supine_lungs *lungs, const double low[3], const double high[3],
+                               double volume, supine_findings *findings) {
   const double held = lungs->volume[0] + lungs->volume[1];
   double farthest = 1.0;
   const char *side = "";
@@ -225,16 +221,15 @@ bool supine_patient_same_size(const supine_lungs *lungs, const double low[3], co
       side = sides[k];
     }
   }
-  text[0] = '\0';
+  static const char advice[] = "check that the file of the patient was fitted to this scan";
   if (is_told(SUPINE_INPUT_PATIENT_BOX, fmax(farthest, 1.0 / farthest))) {
-    (void)supine_print_text(text, text_size,
-                            "the lungs are %.0f %% as %s as those in the scan that was fitted",
-                            100.0 * farthest, side);
+    supine_findings_warn(findings,
+                         "the lungs are %.0f %% as %s as those in the scan that was fitted: %s",
+                         100.0 * farthest, side, advice);
   } else if (volume > 0.0 &&
              is_told(SUPINE_INPUT_PATIENT_VOLUME, fmax(held / volume, volume / held))) {
-    (void)supine_print_text(text, text_size,
-                            "the lungs hold %.0f mL, but %.0f mL in the scan that was fitted", held,
-                            volume);
+    supine_findings_warn(findings,
+                         "the lungs hold %.0f mL, but %.0f mL in the scan that was fitted: %s",
+                         held, volume, advice);
   }
-  return text[0] == '\0';
 }

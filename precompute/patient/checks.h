@@ -4,6 +4,8 @@
 #ifndef SUPINE_PATIENT_CHECKS_H
 #define SUPINE_PATIENT_CHECKS_H
 
+#include <supine/findings.h>
+
 #include "precompute/lungs/lungs.h"
 #include "precompute/patient/pairs.h"
 
@@ -17,11 +19,9 @@ typedef struct supine_patient_size {
 /** Measure lungs. Return false if there are not two of them. */
 bool supine_patient_size_of(const supine_lungs *lungs, supine_patient_size *size);
 
-/** Return whether two scans in one posture differ no more than scans of one person do. Otherwise
- * write a warning that names the measure.
- * @param text  output, if they differ more */
-bool supine_patient_one_person(const supine_patient_size *first, const supine_patient_size *second,
-                               char *text, size_t text_size);
+/** Warn if two scans in one posture differ more than scans of one person do. */
+void supine_patient_check_person(const supine_patient_size *first,
+                                 const supine_patient_size *second, supine_findings *findings);
 
 /** Return the standard error of the logarithm of supine_patient_pairs_growth, by leaving out each
  * of 20 groups of pairs. */
@@ -34,21 +34,18 @@ double supine_patient_growth_error(const supine_patient_pairs *pairs);
 supine_status supine_patient_check_order(const supine_patient_pairs *pairs, double growth,
                                          supine_error *error);
 
-/** Drop pairs whose displacement differs from the median displacement of their eight neighbours by
- * far more than it does for half of the pairs: they were mismatched. At most one pair in five is
- * dropped; if more differ, all are kept, and fewer than 30 pairs are not compared.
- * @param text  output: a warning that names the pairs, counted from 1; empty if all are kept
- * @return the number of pairs dropped */
-supine_status supine_patient_drop_mismatched(supine_patient_pairs *pairs, char *text,
-                                             size_t text_size, size_t *dropped,
-                                             supine_error *error);
+/** Drop pairs, with a warning that names them, counted from 1, whose displacement differs from the
+ * median displacement of their eight neighbours by far more than it does for half of the pairs:
+ * they were mismatched. At most one pair in five is dropped; if more differ, all are kept, and
+ * fewer than 30 pairs are not compared.
+ * @param name  file of the pairs, for the warning */
+supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pairs *pairs,
+                                             supine_findings *findings, supine_error *error);
 
-/** Return whether lungs have the size in which they were scanned for the fit: width, depth, and
- * volume. Otherwise write a warning.
+/** Warn if lungs have another size than in the scan of the fit: width, depth, height or volume.
  * @param low, high  bounding box of the scan that was fitted, mm
- * @param volume     its volume, mL, or 0 if unknown
- * @param text       output, if they differ */
-bool supine_patient_same_size(const supine_lungs *lungs, const double low[3], const double high[3],
-                              double volume, char *text, size_t text_size);
+ * @param volume     its volume, mL, or 0 if unknown */
+void supine_patient_check_size(const supine_lungs *lungs, const double low[3], const double high[3],
+                               double volume, supine_findings *findings);
 
 #endif

@@ -89,9 +89,9 @@ static void name_volumes(supine_patient_scans *scans, supine_patient_record *rec
     record->state[1].volume = (supine_volume){SUPINE_VOLUME_REST, 0.0};
     record->state[0].volume = breath ? (supine_volume){SUPINE_VOLUME_REST, v[0] - v[1]}
                                      : (supine_volume){SUPINE_VOLUME_FULL, 0.0};
-    supine_findings_add(&scans->findings,
-                        "note: the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1],
-                        v[0], breath ? "a breath above it" : "full inflation");
+    supine_findings_note(&scans->findings,
+                         "the scan of %.0f mL counts as rest, that of %.0f mL as %s", v[1], v[0],
+                         breath ? "a breath above it" : "full inflation");
   }
 }
 
@@ -105,11 +105,12 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
     if (share != 0.0 &&
         (supine_input_judge(SUPINE_INPUT_REST_LEAST, supine) != SUPINE_INPUT_TAKEN ||
          supine_input_judge(SUPINE_INPUT_REST_MOST, supine) != SUPINE_INPUT_TAKEN)) {
-      supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL,
-                             "warning: the volume at rest is %.0f %% of full inflation by the two "
-                             "scans and their states, but %.0f %% in healthy people and %.0f %% in "
-                             "COPD, supine",
-                             100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
+      supine_findings_warn(&scans->findings,
+                           "the volume at rest is %.0f %% of full inflation by the two "
+                           "scans and their states, but %.0f %% in healthy people and %.0f %% in "
+                           "COPD, supine",
+                           100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
+      supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL);
     }
   }
 }
@@ -121,10 +122,8 @@ static void warn_of_two_people(supine_patient_scans *scans, const supine_patient
                         supine_patient_size_of(&scans->lungs[1], &size[1]);
   const bool turned = memcmp(record->state[0].gravity, record->state[1].gravity,
                              sizeof record->state[0].gravity) != 0;
-  char text[256];
-  if (record->from_surface && measured && !turned &&
-      !supine_patient_one_person(&size[0], &size[1], text, sizeof text)) {
-    supine_findings_add(&scans->findings, "%s", text);
+  if (record->from_surface && measured && !turned) {
+    supine_patient_check_person(&size[0], &size[1], &scans->findings);
   }
 }
 

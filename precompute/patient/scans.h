@@ -4,7 +4,7 @@
 #ifndef SUPINE_PATIENT_SCANS_H
 #define SUPINE_PATIENT_SCANS_H
 
-#include "base/findings.h"
+#include <supine/findings.h>
 
 #include "precompute/patient/patient_file.h"
 

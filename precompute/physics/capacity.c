@@ -132,10 +132,11 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
       const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
       const double ml = given->ml[axis] + state->volume.ml;
       if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
-        supine_findings_advise(findings, SUPINE_REMEDY_SCAN_OR_REST, NULL,
-                               "warning: the scan holds %.0f mL, but its state and the volume at "
-                               "rest say %.0f mL",
-                               held, ml);
+        supine_findings_warn(findings,
+                             "the scan holds %.0f mL, but its state and the volume at "
+                             "rest say %.0f mL",
+                             held, ml);
+        supine_findings_advise(findings, SUPINE_REMEDY_SCAN_OR_REST, NULL);
       }
     }
   }
@@ -148,17 +149,20 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
     if (supine_input_judge(SUPINE_INPUT_GAS, gas) == SUPINE_INPUT_TAKEN) {
       (void)supine_print_text(held_gas, sizeof held_gas, "%.0f mL of gas", gas);
     }
-    supine_findings_advise(
-        findings, at_rest ? SUPINE_REMEDY_SCAN_EMPTIER : SUPINE_REMEDY_SCAN_NOT_FULL, NULL,
-        "warning: at full inflation the lungs hold %.0f mL (%s mL), at rest %s, where "
+    supine_findings_warn(
+        findings,
+        "at full inflation the lungs hold %.0f mL (%s mL), at rest %s, where "
         "%.0f mL (SD 600 mL) remain after a full expiration%s: %s",
         full, expected, held_gas, part * SUPINE_RESIDUAL_ML,
         is_small ? "; they are too small for an adult, and all constants are an adult's" : "",
         at_rest ? "check the voxel spacing" : "the scan was probably not at full inflation");
-  } else if (full > part * most_ml) {
     supine_findings_advise(
-        findings, at_rest ? SUPINE_REMEDY_SCAN_OVER_REST : SUPINE_REMEDY_NONE, NULL,
-        "warning: at full inflation the lungs hold %.0f mL (%s mL)%s", full, expected,
+        findings, at_rest ? SUPINE_REMEDY_SCAN_EMPTIER : SUPINE_REMEDY_SCAN_NOT_FULL, NULL);
+  } else if (full > part * most_ml) {
+    supine_findings_warn(
+        findings, "at full inflation the lungs hold %.0f mL (%s mL)%s", full, expected,
         at_rest ? "" : ": check the voxel spacing or the unit, and that all of the mask is lung");
+    supine_findings_advise(findings, at_rest ? SUPINE_REMEDY_SCAN_OVER_REST : SUPINE_REMEDY_NONE,
+                           NULL);
   }
 }

@@ -24,7 +24,7 @@
 
 #include <supine/state.h>
 
-#include "base/findings.h"
+#include <supine/findings.h>
 
 #include "precompute/physics/model.h"
 #include "precompute/physics/resting.h"

@@ -75,17 +75,15 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
   return supine_posed_positions(s->basis, &outcome->pose, outcome->predicted, error);
 }
 
-supine_status supine_validation_one_person(const supine_validation *subject, size_t i,
-                                           const supine_lungs *scan, bool *same, char *text,
-                                           size_t text_size, supine_error *error) {
+supine_status supine_validation_check_person(const supine_validation *subject, size_t i,
+                                             const supine_lungs *scan, supine_findings *findings,
+                                             supine_error *error) {
   const supine_state *from = &subject->from.state;
   supine_patient_size size[2] = {0};
   supine_pose pose;
   double volumes[SUPINE_LUNGS_MAX] = {0.0};
   double low[3];
   double high[3];
-  *same = true;
-  text[0] = '\0';
   if (supine_basis_get_info(subject->basis)->lung_count != 2 ||
       !supine_patient_size_of(scan, &size[1]) ||
       supine_distance(subject->state[i].state.gravity, from->gravity) >= same_posture) {
@@ -97,7 +95,7 @@ supine_status supine_validation_one_person(const supine_validation *subject, siz
   size[0] = (supine_patient_size){
       .width = high[0] - low[0], .depth = high[1] - low[1], .volume = volumes[0] + volumes[1]};
   size[0].left = volumes[0] / size[0].volume;
-  *same = supine_patient_one_person(&size[0], &size[1], text, text_size);
+  supine_patient_check_person(&size[0], &size[1], findings);
   return SUPINE_OK;
 }
 

@@ -79,13 +79,12 @@ supine_status supine_validation_compare(supine_validation *subject, size_t i,
                                         const supine_mesh *scan, const supine_patient_pairs *pairs,
                                         supine_error *error);
 
-/* Compare the lungs of the scan of state i with those in the state in which the motion starts, by
- * supine_patient_one_person. Scans in another posture, and single lungs, are not compared.
- * @param same  output
- * @param text  output: a warning if they are hardly those of one person */
-supine_status supine_validation_one_person(const supine_validation *subject, size_t i,
-                                           const supine_lungs *scan, bool *same, char *text,
-                                           size_t text_size, supine_error *error);
+/* Warn if the lungs of the scan of state i and those in the state in which the motion starts are
+ * hardly of one person (supine_patient_check_person). Scans in another posture, and single lungs,
+ * are not compared. */
+supine_status supine_validation_check_person(const supine_validation *subject, size_t i,
+                                             const supine_lungs *scan, supine_findings *findings,
+                                             supine_error *error);
 
 /* Fit a line to the best scales of all states whose posture is that of state[0]: best_scale =
  * from_scale + line_slope * (volume - from_millilitres). */

@@ -99,14 +99,13 @@ static void describe(const sight *s, bool ct, bool scaled, char *text, size_t si
 }
 
 supine_status supine_warp_check_image(const supine_image *depth, const supine_image *image,
-                                      const char *path, supine_warp_image_kind kind, char *warning,
-                                      size_t size, supine_error *error) {
+                                      const char *path, supine_warp_image_kind kind,
+                                      supine_findings *findings, supine_error *error) {
   SUPINE_ARENA arena = {0};
   char text[512] = "";
   const size_t most = depth->size[0] * depth->size[1] * depth->size[2];
   sight s = {.value = supine_arena_take(&arena, most, sizeof *s.value)};
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu nodes", most));
-  warning[0] = '\0';
   look_at_nodes(depth, image, &s);
   if (s.nodes == 0) {
     return SUPINE_OK;
@@ -119,7 +118,7 @@ supine_status supine_warp_check_image(const supine_image *depth, const supine_im
   SUPINE_REFUSE_IF(kind == SUPINE_FIELD_CT && text[0] != '\0', error, SUPINE_ERROR_FORMAT, "%s: %s",
                    path, text);
   if (text[0] != '\0') {
-    (void)snprintf(warning, size, "%s: warning: %s", path, text);
+    supine_findings_warn(findings, "%s: %s", path, text);
   }
   return SUPINE_OK;
 }

@@ -4,7 +4,7 @@
 #ifndef SUPINE_FIELD_CHECK_IMAGE_H
 #define SUPINE_FIELD_CHECK_IMAGE_H
 
-#include <stdbool.h>
+#include <supine/findings.h>
 
 #include "mesh/image/image.h"
 
@@ -16,13 +16,12 @@ typedef enum supine_warp_image_kind {
 } supine_warp_image_kind;
 
 /** Compare an image with the lungs of a basis: do the lungs lie in the image, and does a CT show
- * air in them? A CT that does not fit is refused; for other images a warning is written, with the
- * two frames.
+ * air in them? A CT that does not fit is refused; of other images a warning tells, with the two
+ * frames.
  * @param depth    depth of the nodes of a grid below the lungs' surface (supine_field), mm
- * @param path     names the image in the message
- * @param warning  [size] output; empty if the image fits */
+ * @param path     names the image in the message */
 supine_status supine_warp_check_image(const supine_image *depth, const supine_image *image,
-                                      const char *path, supine_warp_image_kind kind, char *warning,
-                                      size_t size, supine_error *error);
+                                      const char *path, supine_warp_image_kind kind,
+                                      supine_findings *findings, supine_error *error);
 
 #endif

@@ -15,6 +15,7 @@
 #include "precompute/warp/field.h"
 #include "program/command/deform_content.h"
 #include "program/options/inside.h"
+#include "program/options/surface_options.h"
 
 /* Parse a list of labels, such as "7" or "7,8". */
 static supine_status read_rigid(const char *text, void *field, supine_error *error) {
@@ -334,17 +335,16 @@ static supine_status check_images(const supine_deform_content *wanted, const sup
   } images[] = {
       {wanted->image, &wanted->source, wanted->density ? SUPINE_FIELD_CT : SUPINE_FIELD_IMAGE},
       {wanted->labels, &wanted->label_source, SUPINE_FIELD_LABELS}};
-  for (size_t i = 0; i < sizeof images / sizeof *images; ++i) {
-    char text[640];
+  supine_findings findings = {.count = 0};
+  supine_status status = SUPINE_OK;
+  for (size_t i = 0; i < sizeof images / sizeof *images && status == SUPINE_OK; ++i) {
     if (images[i].path != NULL) {
-      SUPINE_TRY(supine_warp_check_image(&field->depth, images[i].image, images[i].path,
-                                         images[i].kind, text, sizeof text, error));
-      if (text[0] != '\0') {
-        supine_options_say("deform", "%s", text);
-      }
+      status = supine_warp_check_image(&field->depth, images[i].image, images[i].path,
+                                       images[i].kind, &findings, error);
     }
   }
-  return SUPINE_OK;
+  supine_options_say_findings("deform", &findings);
+  return status;
 }
 
 static supine_status move_grid(const supine_deform_content *wanted, const supine_basis *basis,

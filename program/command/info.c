@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/findings.h"
 
 #include <supine/compare.h>
 #include <supine/runtime.h>
@@ -176,8 +175,9 @@ static supine_status describe(const char *path, const supine_basis *basis, const
     add_content(root, basis);
   }
   if (at != NULL) {
-    for (const char *line; (line = supine_findings_next(&at, &length)) != NULL;) {
-      (void)json_array_append_new(warnings, json_stringn(line, length));
+    for (; *at != '\0'; at += length + (at[length] == '\n' ? 1 : 0)) {
+      length = strcspn(at, "\n");
+      (void)json_array_append_new(warnings, json_stringn(at, length));
     }
   }
   (void)json_object_set_new(root, "warnings", warnings);

@@ -215,10 +215,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     return error->status = SUPINE_ERROR_FORMAT;
   }
   SUPINE_TRY(status);
-  char doubt[256];
-  if (supine_location_doubt(located.best, doubt, sizeof doubt)) {
-    supine_options_say(name, "warning: %s", doubt);
-  }
+  supine_findings findings = {.count = 0};
+  supine_location_check(located.best, &findings);
+  supine_options_say_findings(name, &findings);
   if (observed.count < OUTLIER_POINTS) {
     supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
                        (int)OUTLIER_POINTS);

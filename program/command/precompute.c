@@ -106,9 +106,6 @@ static const supine_option table[] = {
     {.table = supine_options_model, FILLS(model)},
     {.name = NULL}};
 
-/* Fraction of turned-over triangles above which a warning is printed. */
-static const double turned_over_limit = 0.01;
-
 static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
 }
@@ -143,14 +140,7 @@ static void print_errors(const supine_precompute_report *report, const char *at,
 static void print_report(const request *wanted, const supine_prepared *prepared,
                          const supine_precompute_report *report) {
   char state[64];
-  if (!report->rest_known) {
-    (void)supine_print_text(state, sizeof state, "%g mL", report->volume);
-  } else if (report->rest_part == 1.0) {
-    (void)snprintf(state, sizeof state, "rest");
-  } else {
-    (void)supine_print_text(state, sizeof state, "%g of the volume change from full to rest",
-                            report->rest_part);
-  }
+  supine_precompute_report_state(report, state, sizeof state);
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", wanted->path,
                report->lung_count == 2 ? "two lungs" : "one lung", report->vertex_count,
                report->band, report->mode_count,
@@ -160,16 +150,6 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
   (void)printf("error against the full solve, on %zu held-out direction%s:\n",
                report->direction_count, plural(report->direction_count));
   print_errors(report, ", at ", state);
-  if (report->turned_over > turned_over_limit) {
-    (void)supine_print(
-        stdout,
-        "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six\n"
-        "postures. %s\n",
-        100.0 * report->turned_over, state,
-        prepared->model.reach == 0.0
-            ? "The paper law spreads forces over a few mesh links, however short: give --reach 10"
-            : "Give a longer --reach");
-  }
 }
 
 /* Print the highest band (degree) of spherical harmonics that the given directions of gravity

@@ -121,13 +121,10 @@ static supine_status write_errors(const request *wanted, const supine_validation
 /* Warn if the scan of state i hardly shows the person of the basis. */
 static supine_status tell_other_person(const supine_validation *s, size_t i,
                                        const supine_lungs *lungs, supine_error *error) {
-  char text[256];
-  bool same = true;
-  SUPINE_TRY(supine_validation_one_person(s, i, lungs, &same, text, sizeof text, error));
-  if (!same) {
-    supine_options_say(name, "%s", text);
-  }
-  return SUPINE_OK;
+  supine_findings findings = {.count = 0};
+  const supine_status status = supine_validation_check_person(s, i, lungs, &findings, error);
+  supine_options_say_findings(name, &findings);
+  return status;
 }
 
 /* Compare state i with its scan, and with the landmarks if it is the first. */

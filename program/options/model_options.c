@@ -324,13 +324,10 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
 
 supine_status supine_options_drop_mismatched(const char *command, const char *path,
                                              supine_patient_pairs *pairs, supine_error *error) {
-  char text[512];
-  size_t dropped = 0;
-  SUPINE_TRY(supine_patient_drop_mismatched(pairs, text, sizeof text, &dropped, error));
-  if (dropped > 0) {
-    supine_options_say(command, "%s: %s", path, text);
-  }
-  return SUPINE_OK;
+  supine_findings findings = {.count = 0};
+  const supine_status status = supine_patient_drop_mismatched(path, pairs, &findings, error);
+  supine_options_say_findings(command, &findings);
+  return status;
 }
 
 supine_status supine_options_load_lungs(const char *command, const char *operand,

@@ -57,13 +57,15 @@ const supine_option supine_options_landmarks[] = {
     {.name = NULL}};
 
 void supine_options_say_findings(const char *command, const supine_findings *findings) {
-  const char *at = findings->text;
-  size_t length;
   for (size_t i = 0; i < findings->count; ++i) {
-    const char *line = supine_findings_next(&at, &length);
+    const supine_finding *found = &findings->list[i];
     char words[SUPINE_REMEDY_WORDS];
-    supine_options_remedy_words(findings->advice[i].remedy, findings->advice[i].value, words);
-    supine_options_say(command, "%.*s%s", (int)length, line, words);
+    supine_options_remedy_words(found->remedy, found->value, words);
+    supine_options_say(command, "%s: %s%s", found->is_warning ? "warning" : "note", found->text,
+                       words);
+  }
+  if (findings->dropped > 0) {
+    supine_options_say(command, "warning: and %zu more", findings->dropped);
   }
 }
 

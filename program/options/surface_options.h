@@ -3,7 +3,7 @@
 #ifndef SUPINE_SURFACE_OPTIONS_H
 #define SUPINE_SURFACE_OPTIONS_H
 
-#include "base/findings.h"
+#include <supine/findings.h>
 
 #include "mesh/mesh.h"
 

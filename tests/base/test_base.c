@@ -8,11 +8,11 @@
 #include <sys/stat.h>
 
 #include "base/arena.h"
-#include "base/findings.h"
 #include "base/number.h"
 #include "base/output.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "tests/helpers/findings.h"
 #include "tests/helpers/test.h"
 #include <supine/status.h>
 
@@ -55,24 +55,31 @@ TEST(test_error_set_after_remedy_clears_it) {
   assert_string_equal(error.value, "");
 }
 
-/* Each line has its own remedy, also if a line before it did not fit. */
-TEST(test_findings_dropped_line_drops_its_remedy) {
+/* Each finding has its own remedy, and control characters of names are escaped. */
+TEST(test_findings_advise_each_finding_keeps_its_own) {
   static supine_findings findings;
-  char longer[sizeof findings.text];
-  memset(longer, 'x', sizeof longer - 1);
-  longer[sizeof longer - 1] = '\0';
-  supine_findings_add(&findings, "note: first");
-  supine_findings_advise(&findings, SUPINE_REMEDY_EDGE, NULL, "note: %s", longer);
-  supine_findings_advise(&findings, SUPINE_REMEDY_MIDLINE, "-12", "note: last");
-  assert_string_equal(findings.text, "note: first\nnote: last\n");
-  assert_int_equal(findings.count, 2);
-  assert_int_equal(findings.advice[0].remedy, SUPINE_REMEDY_NONE);
-  assert_int_equal(findings.advice[1].remedy, SUPINE_REMEDY_MIDLINE);
-  assert_string_equal(findings.advice[1].value, "-12");
-  for (size_t i = 0; i < 2 * SUPINE_FINDINGS_MAX; ++i) {
-    supine_findings_add(&findings, "n");
+  supine_findings_note(&findings, "a\nb: %s", "first");
+  supine_findings_warn(&findings, "second");
+  supine_findings_advise(&findings, SUPINE_REMEDY_MIDLINE, "-12");
+  assert_string_equal(findings_text(&findings), "note: a\\x0Ab: first\nwarning: second\n");
+  assert_int_equal(findings.list[0].remedy, SUPINE_REMEDY_NONE);
+  assert_int_equal(findings.list[1].remedy, SUPINE_REMEDY_MIDLINE);
+  assert_string_equal(findings.list[1].value, "-12");
+  supine_findings_warn(NULL, "nobody asks");
+  supine_findings_advise(NULL, SUPINE_REMEDY_EDGE, NULL);
+}
+
+/* What has no room is counted, and its remedy does not become that of another finding. */
+TEST(test_findings_warn_full_list_counts_dropped) {
+  static supine_findings findings;
+  for (size_t i = 0; i < SUPINE_FINDINGS_MAX + 2; ++i) {
+    supine_findings_warn(&findings, "%zu", i);
   }
+  supine_findings_advise(&findings, SUPINE_REMEDY_EDGE, NULL);
   assert_int_equal(findings.count, SUPINE_FINDINGS_MAX);
+  assert_int_equal(findings.dropped, 2);
+  assert_string_equal(findings.list[SUPINE_FINDINGS_MAX - 1].text, "31");
+  assert_int_equal(findings.list[SUPINE_FINDINGS_MAX - 1].remedy, SUPINE_REMEDY_NONE);
 }
 
 TEST(test_error_set_long_message_truncated) {

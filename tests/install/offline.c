@@ -58,8 +58,8 @@ int main(int argc, char **argv) {
   CHECK(supine_precompute_basis(&options, &result, &error) == SUPINE_OK);
   CHECK(seen.last == 1.0 && seen.backwards == 0);
   CHECK(result->report.lung_count == 2 && result->report.mm.rms > 0.0);
-  CHECK(result->assumption_count > 0 && result->finding_count > 0);
-  CHECK(strstr(result->findings[0].text, "the lesion at 60,-20,0 is") != NULL);
+  CHECK(result->assumption_count > 0 && result->findings->count > 0);
+  CHECK(strstr(result->findings->list[0].text, "the lesion at 60,-20,0 is") != NULL);
   supine_basis *basis = NULL;
   supine_state state;
   supine_pose pose;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test displacements of another simulator: loading, fit, cross-validation, refused input. */
 
+#include "tests/helpers/findings.h"
 #include "tests/helpers/program_helpers.h"
 
 #include "base/number.h"
@@ -426,9 +427,9 @@ static void expect_verdict(const supine_fields *fields, bool refused, const char
   supine_fields_fit_free(&fit);
   assert_int_equal(status, refused ? SUPINE_ERROR_FORMAT : SUPINE_OK);
   if (words[0] == '\0') {
-    assert_string_equal(findings.text, "");
+    assert_string_equal(findings_text(&findings), "");
   } else {
-    assert_says(refused ? error.message : findings.text, words);
+    assert_says(refused ? error.message : findings_text(&findings), words);
   }
 }
 

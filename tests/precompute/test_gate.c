@@ -3,6 +3,7 @@
 #include "mesh/repair.h"
 #include "precompute/lungs/gate.h"
 #include "precompute/lungs/phantom.h"
+#include "tests/helpers/findings.h"
 #include "tests/helpers/test.h"
 
 static supine_mesh phantom(void) {
@@ -108,7 +109,7 @@ TEST(test_gate_clean_lungs_no_message) {
   const supine_mesh before = phantom();
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_string_equal(out.findings.text, "");
+  assert_string_equal(findings_text(&out.findings), "");
   assert_true(out.hold);
   assert_int_equal(out.lungs.lung_count, 2);
   assert_memory_equal(mesh.vertices, before.vertices, 3 * mesh.vertex_count * sizeof(double));
@@ -129,7 +130,7 @@ TEST(test_lungs_gate_pitched_scan_warned_of) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text, "pitched by more than 25 degrees");
+  assert_says(findings_text(&out.findings), "pitched by more than 25 degrees");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -137,7 +138,7 @@ TEST(test_lungs_gate_pitched_scan_warned_of) {
 /* Return whether one of the findings has a remedy with a value. */
 static bool advises(const supine_findings *findings, supine_remedy remedy, const char *value) {
   for (size_t i = 0; i < findings->count; ++i) {
-    if (findings->advice[i].remedy == remedy && strcmp(findings->advice[i].value, value) == 0) {
+    if (findings->list[i].remedy == remedy && strcmp(findings->list[i].value, value) == 0) {
       return true;
     }
   }
@@ -155,7 +156,7 @@ TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
     assert_true(advises(&out.findings, SUPINE_REMEDY_AXES_IF_RIGHT, wanted));
-    assert_says(out.findings.text, "warning: the axes are doubtful");
+    assert_says(findings_text(&out.findings), "the axes are doubtful");
     assert_false(out.hold);
     supine_lungs_free(&out.lungs);
     supine_mesh_free(&mesh);
@@ -187,7 +188,7 @@ TEST(test_gate_single_lung_side_found_by_shape) {
     }
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
-    assert_says(out.findings.text, said[right]);
+    assert_says(findings_text(&out.findings), said[right]);
     assert_int_equal(out.lungs.side[0], right != 0 ? -1 : 1);
     assert_true(out.lungs.midline == (right != 0 ? out.lungs.maximum : out.lungs.minimum)[0]);
     supine_lungs_free(&out.lungs);
@@ -211,7 +212,7 @@ TEST(test_gate_specks_dropped_and_reported) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text,
+  assert_says(findings_text(&out.findings),
               "dropped 10 small components, each below 1 % of the volume; 2 components remain");
   assert_int_equal(out.lungs.mesh.vertex_count, vertices);
   assert_memory_equal(out.lungs.mesh.vertices, clean.lungs.mesh.vertices,
@@ -235,9 +236,9 @@ TEST(test_gate_duplicate_loose_reversed_triangles_repaired) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text, "dropped 5 duplicate triangles");
-  assert_says(out.findings.text, "dropped 1 loose triangle\n");
-  assert_says(out.findings.text, "reversed 7 triangles");
+  assert_says(findings_text(&out.findings), "dropped 5 duplicate triangles");
+  assert_says(findings_text(&out.findings), "dropped 1 loose triangle\n");
+  assert_says(findings_text(&out.findings), "reversed 7 triangles");
   assert_int_equal(out.lungs.mesh.triangle_count, before.triangle_count);
   assert_memory_equal(out.lungs.mesh.triangles, before.triangles, 12 * before.triangle_count);
   assert_true(out.lungs.topology.closed);
@@ -260,7 +261,8 @@ TEST(test_gate_many_pieces_reported) {
     append(&mesh, 4, at[0], 4, tetrahedron[0], true);
   }
   outcome out = pass(&mesh, NULL);
-  assert_says(out.findings.text, "warning: 8 components; remove those that are not lung");
+  assert_says(findings_text(&out.findings),
+              "warning: lungs.ply: 8 components; remove those that are not lung");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -281,7 +283,7 @@ TEST(test_gate_touching_lungs_separated) {
   }
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text, "surfaces touched at 1 point: separated there");
+  assert_says(findings_text(&out.findings), "surfaces touched at 1 point: separated there");
   assert_int_equal(out.lungs.lung_count, 2);
   assert_true(out.lungs.topology.closed);
   supine_lungs_free(&out.lungs);
@@ -331,7 +333,7 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
       .name = "small.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
   out = pass(&mesh, &given);
   assert_int_equal(out.status, SUPINE_OK);
-  assert_says(out.findings.text, "warning: the lungs are 0.");
+  assert_says(findings_text(&out.findings), "warning: small.ply: the lungs are 0.");
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -378,10 +380,10 @@ TEST(test_gate_impossible_volume_or_height_refused_unless_units_given) {
     outcome out = pass(&mesh, &given);
     const bool refused = cases[k / 2].refused && k % 2 == 0;
     assert_int_equal(out.status, refused ? SUPINE_ERROR_MESH : SUPINE_OK);
-    assert_says(refused ? out.error.message : out.findings.text, cases[k / 2].said);
+    assert_says(refused ? out.error.message : findings_text(&out.findings), cases[k / 2].said);
     if (cases[k / 2].said[0] == '\0') {
-      assert_null(strstr(out.findings.text, "as high as wide"));
-      assert_null(strstr(out.findings.text, "the lungs hold"));
+      assert_null(strstr(findings_text(&out.findings), "as high as wide"));
+      assert_null(strstr(findings_text(&out.findings), "the lungs hold"));
     }
     supine_lungs_free(&out.lungs);
     supine_mesh_free(&mesh);
@@ -467,8 +469,9 @@ TEST(test_gate_flat_end_and_thin_tip_warned_of) {
     }
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
-    assert_says(out.findings.text, tube == 0 ? "towards the feet are" : "towards the head are");
-    assert_says(out.findings.text, tube == 0 ? "cut off flat there" : "trachea");
+    assert_says(findings_text(&out.findings),
+                tube == 0 ? "towards the feet are" : "towards the head are");
+    assert_says(findings_text(&out.findings), tube == 0 ? "cut off flat there" : "trachea");
     supine_lungs_free(&out.lungs);
     supine_mesh_free(&mesh);
   }

@@ -71,8 +71,8 @@ TEST(test_precompute_basis_defaults_report_and_findings) {
   assert_true(report->rest_known && report->rest_part == 1.0);
   assert_true(result->assumption_count >= 5);
   bool warned = false;
-  for (size_t i = 0; i < result->finding_count; ++i) {
-    const supine_precompute_finding *finding = &result->findings[i];
+  for (size_t i = 0; i < result->findings->count; ++i) {
+    const supine_finding *finding = &result->findings->list[i];
     warned = warned ||
              (finding->is_warning && strstr(finding->text, "the lesion at 900,0,0 is") != NULL);
   }

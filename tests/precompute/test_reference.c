@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test the surface at full inflation, estimated from scans in any state, and the volume at rest in
  * each posture. */
+#include "tests/helpers/findings.h"
 #include "tests/helpers/test.h"
 
 #include <supine/runtime.h>
@@ -381,13 +382,13 @@ TEST(test_doubt_implausible_volume_has_remedy) {
                                   .resting = resting,
                                   .full_volume = {full, full}};
     supine_findings findings = {.count = 0};
-    const char *text = findings.text;
     if (reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {
       reference.scan_volume[0] = reference.scan_volume[1] = 1300.0 - full;
     }
     resting.ml[2] = known[i].rest;
     supine_physics_reference_doubt(&reference, &person, &resting, &findings);
-    assert_int_equal(findings.advice[0].remedy, known[i].remedy);
+    const char *text = findings_text(&findings);
+    assert_int_equal(findings.list[0].remedy, known[i].remedy);
     if (known[i].doubts == NULL ? text[0] != '\0' : strstr(text, known[i].doubts) == NULL) {
       fail_msg("%s of %g mL: '%s'", known[i].scanned, full, text);
     }

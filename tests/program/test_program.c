@@ -360,7 +360,7 @@ TEST(test_mesh_wrong_units_refused) {
 TEST(test_mesh_inward_lung_flipped_and_reported) {
   test_write(in_folder("in.obj"),
              "v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 250\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 1 3 4\n");
-  EXPECT(0, "note: the triangles of the left lung faced inwards: reversed",
+  EXPECT(0, "note: in.obj: the triangles of the left lung faced inwards: reversed",
          "solve in.obj --posture prone -o h.ply");
   EXPECT(2, "surfaces 1 and 2 have the same bounding box: give each lung once",
          "solve in.obj in.obj --posture prone -o h.ply");

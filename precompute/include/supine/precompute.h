@@ -28,6 +28,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <supine/findings.h>
 #include <supine/state.h>
 #include <supine/status.h>
 
@@ -232,14 +233,6 @@ typedef struct supine_precompute_report {
   double turning_rms;
 } supine_precompute_report;
 
-/** Something found in the input, in one line. */
-typedef struct supine_precompute_finding {
-  bool is_warning; /**< otherwise a note */
-  const char *text;
-  supine_remedy remedy; /**< what can be done about it */
-  const char *value;    /**< value of the argument that the remedy suggests; "" if it has none */
-} supine_precompute_finding;
-
 typedef struct supine_precompute_result {
   const void *bytes; /**< content of the basis file, or NULL after a failure */
   size_t size;       /**< number of bytes */
@@ -247,8 +240,7 @@ typedef struct supine_precompute_result {
   const char *const
       *assumptions; /**< [assumption_count] axes, unit, law, state of the scan, volumes */
   size_t assumption_count;
-  const supine_precompute_finding *findings; /**< [finding_count] */
-  size_t finding_count;
+  const supine_findings *findings; /**< what was found in the input */
 } supine_precompute_result;
 
 /** Make a basis. It uses all processors, or as many as the environment variable SUPINE_THREADS

@@ -45,6 +45,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include <supine/findings.h>
 #include <supine/runtime.h>
 #include <supine/state.h>
 
@@ -178,11 +179,9 @@ SUPINE_API supine_status supine_locate(const supine_locate_task *task,
 /** Return what supine_locate found. The struct is in the `space` given to supine_locate. */
 SUPINE_API const supine_location_info *supine_location_get_info(const supine_location *found);
 
-/** Say what is doubtful in what supine_locate found: residuals that are much larger than expected,
- * or a frame that is turned (checks locate-residuals and locate-turned).
- * @param text  [size] one line, written if there is a doubt; 256 bytes are enough
- * @return whether there is a doubt */
-SUPINE_API bool supine_location_doubt(const supine_location_info *found, char *text, size_t size);
+/** Warn of what is doubtful in what supine_locate found: residuals that are much larger than
+ * expected, or a frame that is turned (checks locate-residuals and locate-turned). */
+SUPINE_API void supine_location_check(const supine_location_info *found, supine_findings *findings);
 
 /** Compute the positions of all vertices in the frame of the observations, and their expected
  * errors. Statuses: as supine_basis_pose. Cost: about 3 ms for 25,000 vertices and 20 points.

@@ -21,7 +21,6 @@ import gzip
 import io
 import os
 import tempfile
-import warnings
 from typing import Any, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -495,9 +494,9 @@ class Location:
         task = _c.LocateTask(inside._c, count, seen, state, rigid)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
         info = _c.location_info(self._c).contents
-        doubt = ctypes.create_string_buffer(256)
-        if _c.location_doubt(info, doubt, 256):
-            warnings.warn(_c.string(doubt.value), stacklevel=3)
+        findings = _c.Findings()
+        _c.location_check(info, findings)
+        _program.warn(_program.told(findings))
         self.volume: float = info.volume
         self.volume_error: float = info.volume_error
         self.rotation: Doubles = np.array(info.rotation).reshape(3, 3)

@@ -234,14 +234,19 @@ class Report(ctypes.Structure):
 
 
 class Finding(ctypes.Structure):
-    """The C struct supine_precompute_finding."""
-    _fields_ = [("is_warning", c_bool), ("text", c_char_p), ("remedy", c_int), ("value", c_char_p)]
+    """The C struct supine_finding."""
+    _fields_ = [("is_warning", c_bool), ("text", c_char * 640), ("remedy", c_int), ("value", c_char * 32)]
+
+
+class Findings(ctypes.Structure):
+    """The C struct supine_findings."""
+    _fields_ = [("count", c_size_t), ("dropped", c_size_t), ("list", Finding * 32)]
 
 
 class Result(ctypes.Structure):
     """The C struct supine_precompute_result."""
     _fields_ = [("bytes", c_void_p), ("size", c_size_t), ("report", Report), ("assumptions", POINTER(c_char_p)),
-                ("assumption_count", c_size_t), ("findings", POINTER(Finding)), ("finding_count", c_size_t)]
+                ("assumption_count", c_size_t), ("findings", POINTER(Findings))]
 
 
 class Residual(ctypes.Structure):
@@ -324,7 +329,7 @@ expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(St
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
 location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
-location_doubt = _declare("location_doubt", c_bool, POINTER(LocationInfo), c_void_p, c_size_t)
+location_check = _declare("location_check", None, POINTER(LocationInfo), POINTER(Findings))
 locate_positions = _checked("locate_positions", c_void_p, c_void_p, c_void_p, c_void_p)
 normals = _declare("normals", None, c_void_p, c_void_p, c_void_p)
 

@@ -158,7 +158,7 @@ def _own_names(text: str) -> str:
 def fail(command: str, status: int, said: str) -> None:
     """Raise an exception with the error message of a command."""
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    what = ([""] + [m for m in messages if not re.search(r"(^|: )(warning|note): |^Try '", m)])[-1]
+    what = ([""] + [m for m in messages if not re.match(r"(warning|note): |Try '", m)])[-1]
     kind = _EXITS.get(status, _c.Error)
     if status == 2 and "cannot read" in what:
         kind = _c.ReadError
@@ -167,14 +167,19 @@ def fail(command: str, status: int, said: str) -> None:
     raise kind(_own_names(what) or f"supine {command} ended with exit status {status}")
 
 
-def _warn(messages: Sequence[str]) -> None:
-    """Turn the warnings among messages into Python warnings at the line that called the package."""
+def told(findings: _c.Findings) -> list[str]:
+    """Return the warnings among the findings of the C libraries, each with what to do."""
+    return [_c.string(each.text) + _remedies.words(each.remedy, _c.string(each.value))
+            for each in findings.list[:findings.count] if each.is_warning]
+
+
+def warn(messages: Sequence[str]) -> None:
+    """Raise each message as a Python warning at the line that called the package."""
     level = 1
     while sys._getframe(level).f_globals.get("__package__") == __package__:  # pylint: disable=protected-access
         level += 1
     for message in messages:
-        if "warning: " in message:
-            warnings.warn(message.replace("warning: ", "", 1), stacklevel=level + 1)
+        warnings.warn(message, stacklevel=level + 1)
 
 
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
@@ -203,7 +208,7 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
     for path, name in names.items():
         said, text = said.replace(path, name), text.replace(path, name)
     messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    _warn([_own_names(message) for message in messages])
+    warn([_own_names(message[9:]) for message in messages if message.startswith("warning: ")])
     if status != 0:
         fail(command, status, "\n".join(messages))
     if progress is not None:
@@ -304,14 +309,13 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
             to.lungs.paths = (ctypes.c_char_p * len(surfaces))(*(os.fsencode(path) for path in surfaces))
         to.made_by, to.progress = made_by.encode(errors="replace"), _c.ProgressFunction(tell)
         status = library.supine_precompute_basis(to, result, error)
-    findings = [_c.string(each.text) + _remedies.words(each.remedy, _c.string(each.value))
-                for each in (result[0].findings[:result[0].finding_count] if result else [])]
+    warned = told(result[0].findings[0]) if result else []
     made = ctypes.string_at(result[0].bytes, result[0].size) if status == 0 else b""
     report = _options.describe(result[0]) if status == 0 else ""
     library.supine_precompute_result_free(result)
     if stopped:
         raise stopped[0]
-    _warn(findings)
+    warn(warned)
     if status != 0:  # the same kinds of exceptions as from the program, which calls any wrong input a mesh
         _c.fail(5 if status in (4, 6) else status, error.message.replace(fields.encode(), b"fields"), error)
     if kept is None:
