@@ -226,9 +226,7 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
     add(list, "patient", "%s", prepared->fit);
     free(law);
   }
-  if (prepared->assumed[0] != '\0') {
-    add(list, "assumed", "%s", prepared->assumed);
-  }
+  add(list, "sources", "%s", prepared->sources);
   if (findings[0] != '\0') {
     add(list, "warnings", "%.*s", (int)strlen(findings) - 1, findings);
   }
