@@ -119,7 +119,9 @@ static supine_fact scan_of(const supine_basis *basis) {
   } else if (supine_basis_metadata(basis, "scan_gravity") != NULL) {
     (void)supine_state_describe(&scan, fact.text, sizeof fact.text);
   } else {
-    (void)supine_print_text(fact.text, sizeof fact.text, "the reference of every posture");
+    (void)supine_print_text(fact.text, sizeof fact.text, "%s",
+                            basis->info.is_fields ? "the lungs without gravity"
+                                                  : "the reference of every posture");
   }
   fact.value = volume_of(basis, &scan);
   fact.unit = "mL";
