@@ -117,7 +117,10 @@ static supine_fact scan_of(const supine_basis *basis) {
   if (text != NULL && supine_state_parse(text, &named, NULL) == SUPINE_OK) {
     (void)supine_state_describe(&named, fact.text, sizeof fact.text);
   } else if (supine_basis_metadata(basis, "scan_gravity") != NULL) {
-    (void)supine_state_describe(&scan, fact.text, sizeof fact.text);
+    named.gravity[0] = basis->scan_gravity[0];
+    named.gravity[1] = basis->scan_gravity[1];
+    named.gravity[2] = basis->scan_gravity[2];
+    (void)supine_state_describe(&named, fact.text, sizeof fact.text);
   } else {
     (void)supine_print_text(fact.text, sizeof fact.text, "%s",
                             basis->info.is_fields ? "the lungs without gravity"

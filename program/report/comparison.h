@@ -72,11 +72,7 @@ static inline double supine_report_expansion(const supine_slab *slab) {
 }
 
 /* Return the volume of a lung in a posture, mL. */
-static inline supine_fact supine_report_held(const supine_comparison *comparison, size_t posture,
-                                             size_t lung) {
-  const supine_compared_posture *of = &comparison->posture[posture];
-  return supine_basis_lung_volume(comparison->basis, &of->item->state, &of->pose, lung);
-}
+supine_fact supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);

@@ -22,6 +22,11 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
+supine_fact supine_report_held(const supine_comparison *c, size_t posture, size_t lung) {
+  const supine_compared_posture *of = &c->posture[posture];
+  return supine_basis_lung_volume(c->basis, &of->item->state, &of->pose, lung);
+}
+
 static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_object();

@@ -848,7 +848,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"output", "c.safetensors", 0, "c.safetensors: fields"},
                {"band", "0", 0, "band 0, 1 mode"},
                {"modes", "2", 0, "2 modes"},
-               {"axes", "LPS", 0, "axes of the scan: LPS, 1 mm a unit, given\n"},
+               {"axes", "LPS", 0, "axes of the scan: LPS, 10 mm a unit, given\n"},
                {"units", "in", 0, "25.4 mm a unit"},
                {"without-normals", "", 0, "b.safetensors: fields"},
                {"midline", "60", 2, "midline"},
