@@ -228,9 +228,7 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
     add(list, "patient", "%s", prepared->fit);
     free(law);
   }
-  if (prepared->assumed[0] != '\0') {
-    add(list, "assumed", "%s", prepared->assumed);
-  }
+  add(list, "sources", "%s", prepared->sources);
   const size_t count = told != NULL ? findings->count : 0;
   for (size_t i = 0; i < count; ++i) {
     supine_text_add(told, room, "%s%s: %s", i > 0 ? "\n" : "",

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/facts.h>
 #include <supine/inputs.h>
 #include <supine/precompute.h>
 
@@ -207,26 +208,24 @@ static const char *copy(supine_arena *memory, const char *text, size_t length) {
   return made;
 }
 
-/* List the assumptions, which "; " separates. */
-static void list_assumptions(const char *assumed, owned *to) {
-  static const char separator[] = "; ";
-  size_t count = 1;
-  for (const char *at = assumed; (at = strstr(at, separator)) != NULL; at += strlen(separator)) {
-    ++count;
-  }
+/* List what the basis assumes and was given: its facts, a line each. */
+static supine_status list_facts(owned *to, supine_error *error) {
+  supine_basis *basis = NULL;
+  supine_fact facts[SUPINE_FACTS_MAX];
+  SUPINE_TRY(supine_basis_open_memory(to->bytes.data, to->bytes.size, &basis, error));
+  const size_t count = supine_basis_facts(basis, facts);
   const char **list = supine_arena_zeros(&to->memory, count, sizeof *list);
-  if (list == NULL) {
-    return;
+  for (size_t i = 0; i < count && list != NULL; ++i) {
+    char value[320];
+    char line[400];
+    (void)supine_fact_print(&facts[i], value, sizeof value);
+    const int length = snprintf(line, sizeof line, "%s: %s", facts[i].name, value);
+    list[i] = copy(&to->memory, line, (size_t)length);
   }
-  const char *at = assumed;
-  for (size_t i = 0; i < count; ++i) {
-    const char *end = strstr(at, separator);
-    const size_t length = end != NULL ? (size_t)(end - at) : strlen(at);
-    list[i] = copy(&to->memory, at, length);
-    at += length + (end != NULL ? strlen(separator) : 0);
-  }
+  supine_basis_close(basis);
   to->result.assumptions = list;
   to->result.assumption_count = count;
+  return supine_arena_check(&to->memory, error, "%zu facts", count);
 }
 
 static supine_status make(const supine_precompute_options *options, owned *to,
@@ -241,12 +240,12 @@ static supine_status make(const supine_precompute_options *options, owned *to,
   supine_status status = supine_precompute_prepare(&told, &prepared, error);
   if (status == SUPINE_OK) {
     told.context = (void *)&basis;
-    list_assumptions(prepared.assumed, to);
     status = supine_precompute_make(&told, &prepared, &prepared.source.findings, &to->bytes,
                                     &to->result.report, error);
   }
   to->findings = prepared.source.findings;
   SUPINE_TRY(status);
+  SUPINE_TRY(list_facts(to, error));
   to->result.bytes = to->bytes.data;
   to->result.size = to->bytes.size;
   return supine_arena_check(&to->memory, error, "a report");

@@ -279,90 +279,51 @@ static bool varies(const supine_model *model, size_t count) {
   return !same;
 }
 
-/* Return what the volume at rest is known from. */
-static const char *source_of_rest(const supine_resting *resting, bool predicted,
-                                  const supine_prepared *p) {
-  if (p->reference.scan.state.volume.kind == SUPINE_VOLUME_REST) {
-    return "the scan";
+/* Return the word of the metadata "sources" for what the volume at rest is known from. */
+static const char *source_of_rest(const supine_resting *resting, const supine_prepared *p) {
+  if (p->reference.scan.state.volume.kind == SUPINE_VOLUME_REST &&
+      p->reference.scan.state.volume.ml == 0.0) {
+    return "scan";
   }
   if (p->patient != NULL) {
-    return "the fit";
+    return "fit";
   }
-  if (supine_physics_resting_given(resting)) {
-    return "the given volumes";
+  if (supine_physics_resting_given(resting) || p->named.has_rest) {
+    return "given";
   }
-  if (predicted) {
-    return "height and sex";
+  if (resting->predicted) {
+    return "person";
   }
-  return resting->assumed == SUPINE_REST_SHARE ? "healthy people's share" : "the share in COPD";
+  return resting->assumed == SUPINE_REST_SHARE ? "healthy" : "copd";
 }
 
-static void summarize(const knowledge *given, bool predicted, supine_prepared *p) {
-  static const double supine[3] = {0.0, 1.0, 0.0};
-  const supine_resting *resting = &given->resting;
-  const supine_reference *reference = &p->reference;
-  const size_t size = sizeof p->assumed;
-  char state[160];
-  double ml[2];
-  supine_text_add(p->assumed, size, "%s; %s law; scan ", p->source.summary,
-                  p->patient != NULL ? "the patient's own"
-                                     : supine_physics_law_names[p->model.law]);
-  if (!reference->known) {
-    supine_text_add(p->assumed, size, "taken as the reference of every posture");
-    return;
+/* Return the word of the metadata "sources" for what full inflation is known from. */
+static const char *source_of_full(const supine_resting *resting, const supine_prepared *p) {
+  const supine_scan *scan = &p->reference.scan;
+  if (scan->full > 0.0 || p->named.full > 0.0) {
+    return "given";
   }
-  (void)supine_state_describe(&reference->scan.state, state, sizeof state);
-  const double full = reference->full_volume[0] + reference->full_volume[1];
-  const double held = full + reference->scan_volume[0] + reference->scan_volume[1];
-  const bool known = supine_physics_resting_given(resting);
-  const bool at_rest = reference->scan.state.volume.kind == SUPINE_VOLUME_REST;
-  if (held != full) {
-    supine_text_add(p->assumed, size, "%s, %.0f mL; ", state, held);
+  if (scan->state.volume.kind == SUPINE_VOLUME_REST) {
+    return supine_physics_resting_given(resting) ? "given-rest" : "rest";
   }
-  const char *full_from = "";
-  if (reference->scan.full > 0.0) {
-    full_from = "given, ";
-  } else if (at_rest) {
-    full_from = known ? "from rest, " : "assumed from rest, ";
-  }
-  supine_text_add(p->assumed, size, "%sfull inflation %.0f mL (%s", held != full ? "" : "at ", full,
-                  full_from);
-  supine_physics_reference_compare(reference, &given->person, p->assumed, size);
-  const double rest = supine_physics_reference_rest(reference, supine, ml);
-  const double ratio = exp(resting->spread / resting->assumed);
-  supine_text_add(p->assumed, size, "); rest supine %.0f mL (", rest);
-  if (!at_rest && !known) {
-    supine_text_add(p->assumed, size, "%.0f to %.0f ", rest / ratio, rest * ratio);
-  }
-  supine_text_add(p->assumed, size, "by %s)", source_of_rest(resting, predicted, p));
-  double collapsed = 0.0; /* volume of the collapsed lungs at the inflation of the scan, mL */
-  for (size_t lung = 0; lung < reference->lung_count; ++lung) {
-    collapsed +=
-        p->model.share[lung] * (reference->full_volume[lung] + reference->scan_volume[lung]);
-  }
-  if (p->model.share[0] != 1.0 || p->model.share[1] != 1.0) {
-    supine_text_add(
-        p->assumed, size,
-        "; collapsed evenly towards the hilum (assumed), in every state but the scan: to "
-        "%.0f mL at the inflation of the scan",
-        collapsed);
-  }
+  return scan->state.volume.ml == 0.0 ? "scan" : "given";
 }
 
-/* Say what is assumed of the lungs of another simulator's fields. */
-static void summarize_fields(supine_prepared *p) {
-  char posture[160] = "taken as the lungs without gravity";
-  if (p->posture.known) {
-    (void)supine_state_describe(&p->posture.state, posture, sizeof posture);
+/* Say where the axes, the state of the scan and the volumes come from, in the words of
+ * supine_basis_facts. */
+static void list_sources(const supine_precompute_options *options, const supine_resting *resting,
+                         supine_prepared *p) {
+  const size_t size = sizeof p->sources;
+  const char *scan = p->patient != NULL ? "fit" : "default";
+  if (options->scan.shown != SUPINE_SHOWN_DEFAULT) {
+    scan = "given";
   }
-  supine_text_add(p->assumed, sizeof p->assumed, "%s; scan %s", p->source.summary, posture);
-  if (p->named.has_rest) {
-    supine_text_add(p->assumed, sizeof p->assumed, "; rest supine %.0f mL (given)",
-                    p->named.rest[SUPINE_REST_SUPINE]);
+  supine_text_add(p->sources, size, "axes=%s,scan=%s", p->source.axes_from, scan);
+  if (p->reference.known || p->named.has_rest) {
+    supine_text_add(p->sources, size, ",rest=%s", source_of_rest(resting, p));
   }
-  if (p->named.full > 0.0) {
-    supine_text_add(p->assumed, sizeof p->assumed,
-                    "; full inflation %.0f mL in every posture (given)", p->named.full);
+  if (p->reference.known || p->named.full > 0.0) {
+    supine_text_add(p->sources, size, ",full=%s", source_of_full(resting, p));
   }
 }
 
@@ -531,19 +492,17 @@ static supine_status check_height(const knowledge *known, const supine_resting *
   return SUPINE_OK;
 }
 
-/* Move the scan to the reference surface, and say what is assumed. */
+/* Move the scan to the reference surface. Complete the volumes at rest. */
 static supine_status find_reference(supine_prepared *p, const knowledge *known,
-                                    supine_error *error) {
+                                    supine_resting *resting, supine_error *error) {
   supine_lungs *lungs = &p->source.lungs;
   const supine_reference scanned = {.scan = known->scan,
                                     .lung_count = lungs->lung_count,
                                     .side = {lungs->side[0], lungs->side[1]}};
-  supine_resting resting = known->resting;
-  supine_physics_reference_predict_rest(&scanned, &known->person, &resting);
-  SUPINE_TRY(check_height(known, &resting, p, error));
-  SUPINE_TRY(supine_physics_reference_find(lungs, &p->model, &known->scan, &resting, &p->reference,
-                                           error));
-  summarize(known, resting.predicted, p);
+  supine_physics_reference_predict_rest(&scanned, &known->person, resting);
+  SUPINE_TRY(check_height(known, resting, p, error));
+  SUPINE_TRY(
+      supine_physics_reference_find(lungs, &p->model, &known->scan, resting, &p->reference, error));
   if (p->reference.known) {
     supine_physics_reference_doubt(&p->reference, &known->person, &known->resting,
                                    &p->source.findings);
@@ -563,11 +522,12 @@ supine_status supine_precompute_prepare(const supine_precompute_options *options
   }
   SUPINE_TRY(supine_precompute_source_load_lungs(options, &prepared->source, error));
   SUPINE_TRY(set_model(options, patient, prepared, &known, error));
-  if (options->fields != NULL) {
-    summarize_fields(prepared);
-    return SUPINE_OK;
+  supine_resting resting = known.resting;
+  if (options->fields == NULL) {
+    SUPINE_TRY(find_reference(prepared, &known, &resting, error));
   }
-  return find_reference(prepared, &known, error);
+  list_sources(options, &resting, prepared);
+  return SUPINE_OK;
 }
 
 void supine_precompute_prepared_free(supine_prepared *prepared) {

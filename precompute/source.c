@@ -158,14 +158,13 @@ static void summarize(const reading *r, supine_source *source) {
                          "the axes RAI grow to the right, front and feet; what ITK calls RAI "
                          "is LPS here");
   }
-  const char *axes_from = report->axes_from_tag ? "the file's tag" : "assumed";
+  source->axes_from = report->axes_from_tag ? "file" : "default";
   if (load->axes != SUPINE_AXES_AUTO) {
-    axes_from = "as given";
+    source->axes_from = "given";
   }
-  supine_text_add(source->summary, size, "%s axes (%s), %g mm a unit", letters, axes_from,
-                  load->millimetres_per_unit == 0.0 ? 1.0 : load->millimetres_per_unit);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    supine_text_add(source->summary, size, "; %s lung in", supine_lungs_name(lungs, lung));
+    supine_text_add(source->summary, size, "%s%s lung in", lung == 0 ? "" : "; ",
+                    supine_lungs_name(lungs, lung));
     for (size_t axis = 0; axis < 3; ++axis) {
       supine_text_add(source->summary, size, "%s %c %.0f to %.0f", axis == 0 ? "" : ",",
                       "xyz"[axis], lungs -> low[lung][axis], lungs -> high[lung][axis]);

@@ -28,7 +28,8 @@ typedef struct supine_source {
   bool is_map;    /**< whether lungs were read from label maps; if so, `report` is set */
   bool axes_hold; /**< whether the shape of the lungs clearly confirms the axes */
   supine_labels_report report;
-  char summary[256];        /**< for the user: axes, unit and bounding boxes of the lungs */
+  char summary[256];        /**< for the user: bounding boxes of the lungs */
+  const char *axes_from;    /**< "given", "file" or "default" */
   supine_findings findings; /**< notes and warnings, also after a failure */
 } supine_source;
 

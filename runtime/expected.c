@@ -79,9 +79,7 @@ static double mean_square_of_lungs(const supine_basis *basis, const supine_pose 
   return fmax(0, sum);
 }
 
-/* Return the kind of volume that was assumed instead of measured: rest, full inflation, or DEFAULT
- * for none. */
-static supine_volume_kind assumed_kind(const supine_basis *basis) {
+supine_volume_kind supine_expected_assumed(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
   const char *state = supine_basis_metadata(basis, "scan_state");
   const bool at_rest = (scanned != NULL && strcmp(scanned, "rest") == 0) ||
@@ -165,7 +163,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                                       const supine_state *from, double deviation, double least,
                                       supine_expected_model *m, supine_error *error) {
   const supine_state *const states[2] = {state, from};
-  const supine_volume_kind assumed = assumed_kind(basis);
+  const supine_volume_kind assumed = supine_expected_assumed(basis);
   const double spread = number_of(basis, "resting_spread", EXPECTED_SPREAD) *
                         (assumed == SUPINE_VOLUME_REST ? resting_share(basis) : 1);
   const double own = supine_expected_constant(basis);

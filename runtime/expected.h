@@ -29,6 +29,14 @@ enum { LOCATE_BLOCK = 256 }; /**< number of vertices evaluated at once */
  * metadata "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */
 double supine_expected_constant(const supine_basis *basis);
 
+/** Limits of the 95 % interval of SUPINE_EXPECTED_ERROR_MM, mm. */
+#define EXPECTED_ERROR_LOW 3.7
+#define EXPECTED_ERROR_HIGH 5.7
+
+/** Return the kind of volume that was assumed instead of measured: rest, full inflation, or DEFAULT
+ * for none. */
+supine_volume_kind supine_expected_assumed(const supine_basis *basis);
+
 /** Return the sum of the volumes of all lungs of the reference surface, mL. */
 double supine_expected_reference(const supine_basis *basis);
 

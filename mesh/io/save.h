@@ -13,11 +13,11 @@ typedef struct mesh_writer {
   const supine_mesh *mesh;
   supine_mesh_save_options options;
   unsigned char source[3]; /**< axis of `mesh`, 0 to 2, that gives each coordinate of the file */
-  double factor[3];  /**< for each axis of the file: 1 or -1, divided by the file's unit in mm */
-  bool mirrored;     /**< whether the file's axes are left-handed: triangles are then reversed */
-  char space[4];     /**< letters of the file's axes: "LPS", "RAS", ... */
-  char unit[24];     /**< unit of lengths: "mm", "cm", ... */
-  char comment[256]; /**< one printable line, or "" */
+  double factor[3];   /**< for each axis of the file: 1 or -1, divided by the file's unit in mm */
+  bool mirrored;      /**< whether the file's axes are left-handed: triangles are then reversed */
+  char space[4];      /**< letters of the file's axes: "LPS", "RAS", ... */
+  char unit[24];      /**< unit of lengths: "mm", "cm", ... */
+  char comment[1536]; /**< one printable line, or "" */
 } mesh_writer;
 
 /** Compute the position of vertex i in the file's axes and unit. */

@@ -12,6 +12,7 @@
 #include "program/command/deform_content.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 #include "program/options/state_notes.h"
 #include "program/options/state_options.h"
 
@@ -60,7 +61,8 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
                               .subtract_hilum = wanted->frame == 1};
-  char comment[192];
+  char comment[256 + SUPINE_CAVEATS_SIZE];
+  char caveats[SUPINE_CAVEATS_SIZE];
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
@@ -72,8 +74,9 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
         supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &expected, error));
   }
   moved.expected = expected;
-  (void)snprintf(comment, sizeof comment, "displacement from %s%s", moved.from.name,
-                 wanted->frame == 1 ? ", in the frame of the hilum" : "");
+  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
+  (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s", moved.from.name,
+                 wanted->frame == 1 ? ", in the frame of the hilum" : "", caveats);
   moved.save.comment = comment;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
   return supine_command_deform_content(&wanted->content, basis, &moved, error);

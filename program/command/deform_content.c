@@ -14,6 +14,7 @@
 #include "precompute/warp/check_image.h"
 #include "precompute/warp/field.h"
 #include "program/command/deform_content.h"
+#include "program/options/facts.h"
 #include "program/options/inside.h"
 #include "program/options/surface_options.h"
 
@@ -133,20 +134,23 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
 }
 
 /* Print the rows of a CSV file: name, lung, position, displacement and expected error. */
-static void print_rows(const supine_deformation *moved, const supine_basis_info *info,
+static void print_rows(const supine_deformation *moved, const supine_basis *basis,
                        const supine_target *rows, size_t count, FILE *file) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_mesh_save_options *frame = &moved->save;
   const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
   const bool known = moved->expected.sigma != NULL;
   char axes[4];
   char unit_name[24];
+  char caveats[SUPINE_CAVEATS_SIZE];
   supine_mesh_unit_name(unit, unit_name);
   supine_mesh_axes_letters(frame->axes, axes);
+  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   (void)fprintf(file,
                 "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: length of "
-                "the displacement%s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
+                "the displacement%s; %s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
                 moved->from.name, axes, unit_name,
-                known ? "; expected_error_mm: " SUPINE_EXPECTED_MEANING : "",
+                known ? "; expected_error_mm: " SUPINE_EXPECTED_MEANING : "", caveats,
                 known ? ",expected_error_mm" : "");
   for (const supine_target *row = rows; row < rows + count; ++row) {
     double at[3];
@@ -168,13 +172,12 @@ static void print_rows(const supine_deformation *moved, const supine_basis_info 
 /* Write a CSV file with a row for each structure, or for each vertex if `each` is true. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, bool each, supine_error *error) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_pose *const pose[2] = {&moved->from.pose, &moved->pose};
   SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_options_targets_free) supine_target *rows = NULL;
   supine_output output;
   SUPINE_TRY(supine_options_names_open(basis, &names, error));
-  const size_t count = each ? info->vertex_count : names.count;
+  const size_t count = each ? supine_basis_get_info(basis)->vertex_count : names.count;
   SUPINE_TRY(
       supine_options_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
@@ -183,7 +186,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       supine_options_target_shift(&rows[i], moved->hilum.move);
     }
   }
-  print_rows(moved, info, rows, count, output.file);
+  print_rows(moved, basis, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
   char state[160];
   (void)supine_state_describe(&moved->state, state, sizeof state);
@@ -376,15 +379,24 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
 
 /* Print the range of the volume of all lungs if it was assumed from other people. */
 static void print_range(const supine_basis *basis, const supine_deformation *moved) {
-  supine_held sum = {0};
-  for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    const supine_held held = supine_options_held(basis, &moved->state, &moved->pose, lung);
-    sum.low += held.low;
-    sum.high += held.high;
-    sum.assumed = sum.assumed || held.assumed;
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  double low = 0.0;
+  double high = 0.0;
+  bool assumed = false;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
+    low += isfinite(held.low) ? held.low : held.value;
+    high += isfinite(held.high) ? held.high : held.value;
+    assumed = assumed || isfinite(held.low);
   }
-  if (sum.assumed) {
-    (void)supine_print(stdout, "; assumed from other people: %.0f to %.0f mL", sum.low, sum.high);
+  if (assumed) {
+    (void)supine_print(stdout, "; assumed from other people: %.0f to %.0f mL", low, high);
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
+    if (held.source == SUPINE_SOURCE_COLLAPSED) {
+      (void)supine_print(stdout, "; the %s lung is collapsed: %.0f mL", held.name, held.value);
+    }
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 
 /* Compute the share of each spherical-harmonic band (degree) in the squared displacement; 0 if the
  * surface has no area. */
@@ -33,15 +34,23 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
 }
 
 /* Keys of the basis's metadata that are printed under the same name. */
-static const char *const facts[] = {"content",        "assumed",
-                                    "patient",        "scanned",
-                                    "resting_shares", "law",
-                                    "force",          "direction",
-                                    "stiffness",      "direction_constants",
-                                    "midline_mm",     "reference_volume_ml",
-                                    "lung_share",     "lesions",
-                                    "reach_mm",       "made_by",
-                                    "error_method",   "turned_over_percent"};
+static const char *const facts[] = {"content",
+                                    "patient",
+                                    "scanned",
+                                    "resting_shares",
+                                    "law",
+                                    "force",
+                                    "direction",
+                                    "stiffness",
+                                    "direction_constants",
+                                    "midline_mm",
+                                    "reference_volume_ml",
+                                    "lung_share",
+                                    "lesions",
+                                    "reach_mm",
+                                    "made_by",
+                                    "error_method",
+                                    "turned_over_percent"};
 /* Keys of metadata that are printed in the object "error", without the prefix "error_". */
 static const char *const errors[] = {"error_directions",
                                      "error_rms_percent",
@@ -152,7 +161,7 @@ static cost cost_of(const supine_basis_info *info) {
 }
 
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
-                              json_t **described, supine_error *error) {
+                              bool json, json_t **described, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const cost per_vertex = cost_of(info);
   const char *lungs = supine_basis_metadata(basis, "lungs");
@@ -171,6 +180,7 @@ static supine_status describe(const char *path, const supine_basis *basis, const
   for (size_t i = 0; i < sizeof facts / sizeof *facts; ++i) {
     add_fact(root, facts[i], basis, facts[i]);
   }
+  (void)json_object_set_new(root, "facts", supine_options_facts(basis, !json));
   if (supine_basis_metadata(basis, "content") != NULL) {
     add_content(root, basis);
   }
@@ -214,7 +224,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu bands", bands));
   SUPINE_TRY(band_energy(basis, energy, error));
-  SUPINE_TRY(describe(path, basis, energy, &described, error));
+  SUPINE_TRY(describe(path, basis, energy, wanted->json, &described, error));
   supine_options_print(json_incref(described), wanted->json);
   return SUPINE_OK;
 }

@@ -12,6 +12,8 @@
 #include "precompute/library.h"
 #include "precompute/names.h"
 #include "program/command/list.h"
+#include "program/options/basis_input.h"
+#include "program/options/facts.h"
 #include "program/options/model_options.h"
 #include "program/options/surface_options.h"
 
@@ -110,14 +112,12 @@ static const char *plural(size_t count) {
   return count == 1 ? "" : "s";
 }
 
-/* Print the assumptions, one per line, and the options that change them. */
-static void print_assumed(const char *options, const char *assumed) {
-  (void)printf("assumed (%s change it):\n", options);
-  for (const char *item = assumed, *end; item != NULL; item = end) {
-    end = strstr(item, "; ");
-    (void)printf("  %.*s\n", (int)(end != NULL ? end - item : 1000), item);
-    end = end != NULL ? end + 2 : NULL;
-  }
+/* Print what the basis assumes and was given, the options that change it, and the boxes of the
+ * scanned lungs. */
+static void print_facts(const char *options, const supine_prepared *prepared,
+                        const supine_basis *basis) {
+  (void)printf("%s\nassumed and given (%s change it):\n", prepared->source.summary, options);
+  supine_options_facts_print(basis);
 }
 
 static void print_errors(const supine_precompute_report *report, const char *at,
@@ -138,7 +138,7 @@ static void print_errors(const supine_precompute_report *report, const char *at,
 }
 
 static void print_report(const request *wanted, const supine_prepared *prepared,
-                         const supine_precompute_report *report) {
+                         const supine_basis *basis, const supine_precompute_report *report) {
   char state[64];
   supine_precompute_report_state(report, state, sizeof state);
   (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", wanted->path,
@@ -146,7 +146,7 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
                report->band, report->mode_count,
                wanted->model.precompute.modes.harmonics ? "harmonic" : "mode",
                plural(report->mode_count));
-  print_assumed("--axes, --units, --scanned, --law and --resting", prepared->assumed);
+  print_facts("--axes, --units, --scanned, --law and --resting", prepared, basis);
   (void)printf("error against the full solve, on %zu held-out direction%s:\n",
                report->direction_count, plural(report->direction_count));
   print_errors(report, ", at ", state);
@@ -155,7 +155,7 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
 /* Print the highest band (degree) of spherical harmonics that the given directions of gravity
  * determine, and the leave-one-out error of each band. */
 static void print_fit(const request *wanted, const supine_prepared *prepared,
-                      const supine_precompute_report *report) {
+                      const supine_basis *basis, const supine_precompute_report *report) {
   const size_t highest = report->band_count - 1;
   (void)printf("%s: fields of gravity", wanted->path);
   if (report->volume_count > 1) {
@@ -174,7 +174,7 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
     (void)printf(", %zu clusters", report->cluster_count);
   }
   (void)puts("");
-  print_assumed("--axes, --units and --scanned", prepared->assumed);
+  print_facts("--axes, --units and --scanned", prepared, basis);
   const double *nearest = report->nearest_supine;
   (void)supine_print(
       stdout,
@@ -245,24 +245,25 @@ static int show_progress(void *progress, double fraction) {
   return supine_options_progress_step(progress, fraction) ? 0 : 1;
 }
 
+static void free_bytes(supine_bytes *bytes) {
+  free(bytes->data);
+}
+
 /* Make the basis of the lungs, and write its file. */
 static supine_status write_basis(request *wanted, const supine_prepared *prepared,
-                                 supine_precompute_report *report, supine_error *error) {
+                                 supine_bytes *bytes, supine_precompute_report *report,
+                                 supine_error *error) {
   supine_precompute_options *options = &wanted->model.precompute;
-  supine_bytes bytes = {.data = NULL};
   supine_findings findings = {.count = 0};
   supine_progress progress = supine_options_progress_begin(name);
   options->progress = show_progress;
   options->context = &progress;
-  supine_status status =
-      supine_precompute_make(options, prepared, &findings, &bytes, report, error);
+  const supine_status status =
+      supine_precompute_make(options, prepared, &findings, bytes, report, error);
   supine_options_progress_end(&progress);
   supine_options_say_findings(name, &findings);
-  if (status == SUPINE_OK) {
-    status = supine_precompute_save(wanted->path, &bytes, error);
-  }
-  free(bytes.data);
-  return status;
+  SUPINE_TRY(status);
+  return supine_precompute_save(wanted->path, bytes, error);
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
@@ -289,11 +290,14 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (prepared.patient != NULL) {
     (void)printf("%s\n", prepared.fit);
   }
-  SUPINE_TRY(write_basis(wanted, &prepared, &report, error));
+  SUPINE_FREED_BY(free_bytes) supine_bytes bytes = {.data = NULL};
+  SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
+  SUPINE_TRY(write_basis(wanted, &prepared, &bytes, &report, error));
+  SUPINE_TRY(supine_basis_open_memory(bytes.data, bytes.size, &basis, error));
   if (options->fields != NULL) {
-    print_fit(wanted, &prepared, &report);
+    print_fit(wanted, &prepared, basis, &report);
   } else {
-    print_report(wanted, &prepared, &report);
+    print_report(wanted, &prepared, basis, &report);
   }
   return SUPINE_OK;
 }

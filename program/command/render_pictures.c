@@ -13,6 +13,7 @@
 
 #include "program/command/render_pictures.h"
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 #include "program/options/inside.h"
 
 static const char name[] = "render";
@@ -54,6 +55,7 @@ typedef struct studio {
   supine_panel panel[SUPINE_PANELS_MAX];
   double max; /* largest displacement of all panels so far, mm */
   char label[128];
+  char caveats[SUPINE_CAVEATS_SIZE]; /* what the picture must say of the lungs */
   supine_arena arena;
 } studio;
 
@@ -73,6 +75,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
                                        &s->basis, error));
   SUPINE_TRY(supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error));
   SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
+  (void)supine_basis_caveats(s->basis, s->caveats, sizeof s->caveats);
   if (s->wanted->inside != NULL) {
     SUPINE_TRY(
         supine_options_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
@@ -208,6 +211,7 @@ static supine_picture make_picture(studio *s) {
                           .bar_label = s->label,
                           .legend = s->legend,
                           .remark = "computed, not measured",
+                          .caption = s->caveats,
                           .colours = SUPINE_COLOURS_DISPLACEMENT,
                           .largest = largest,
                           .beyond = s->max > largest,

@@ -2,6 +2,8 @@
 /* Say what a volume means where the model has to assume something or does not hold. */
 #include <math.h>
 
+#include <supine/facts.h>
+
 #include "precompute/physics/resting.h"
 #include "precompute/posed/posed.h"
 #include "program/options/state_notes.h"
@@ -21,7 +23,8 @@ static void tell_rest(const char *command, const supine_basis *basis, const supi
     absolute = absolute || state->lungs[lung].volume.kind == SUPINE_VOLUME_ABSOLUTE;
   }
   for (size_t lung = 0; lung < supine_basis_get_info(basis)->lung_count; ++lung) {
-    assumed = assumed || supine_options_held(basis, rest, resting, lung).assumed;
+    assumed = assumed ||
+              supine_basis_lung_volume(basis, rest, resting, lung).source == SUPINE_SOURCE_ASSUMED;
   }
   if (absolute && assumed) {
     const double held = supine_posed_volume(basis, pose);

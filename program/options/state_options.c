@@ -118,7 +118,7 @@ const supine_option supine_options_volume[] = {
      SUPINE_VOLUME_HELP
      "\nleft=VOLUME,right=VOLUME: a volume for each lung; name every lung\nDefault rest; for a "
      "basis made by 'supine precompute' with --scanned none or --law paper, scan+500. A basis made "
-     "with --fields has no volumes",
+     "with --fields takes the volumes that were simulated, if they were given for each direction",
      SUPINE_FILLS(supine_volume_options, state), .read = supine_options_read_volume,
      .rivals = "breath"},
     {.table = supine_options_folds, SUPINE_FILLS(supine_volume_options, allow_folds)},
@@ -243,45 +243,4 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
     supine_options_say(command, "warning: %s", allowed.message);
   }
   return SUPINE_OK;
-}
-
-/* The logarithm of an assumed volume has a normal distribution, so that its range, one standard
- * deviation to either side, is longer upwards. */
-supine_held supine_options_held(const supine_basis *basis, const supine_state *state,
-                                const supine_pose *pose, size_t lung) {
-  const char *name = supine_basis_get_info(basis)->lung_names[lung];
-  const bool named = state->lung_count > 0;
-  const supine_volume *volume =
-      named ? &state->lungs[strcmp(state->lungs[0].name, name) != 0].volume : &state->volume;
-  const char *spread = supine_basis_metadata(basis, "resting_spread");
-  const char *scanned = supine_basis_metadata(basis, "scan_state");
-  const bool at_rest = scanned != NULL && strstr(scanned, "rest") != NULL;
-  double in_scan[SUPINE_LUNGS_MAX] = {0.0}, volumes[SUPINE_LUNGS_MAX] = {0.0};
-  supine_pose scanned_pose;
-  if (supine_basis_scan_pose(basis, &scanned_pose, NULL) == SUPINE_OK) {
-    supine_basis_volumes(basis, &scanned_pose, in_scan);
-  }
-  (void)supine_basis_volumes(basis, pose, volumes);
-  const double held = volumes[lung];
-  const double share = named ? 1.0 : held / supine_posed_volume(basis, pose);
-  const double above = share * volume->ml; /* part of the volume that is given */
-  const supine_volume_kind kind =
-      volume->kind == SUPINE_VOLUME_DEFAULT ? SUPINE_VOLUME_REST : volume->kind;
-  const bool other = kind == (at_rest ? SUPINE_VOLUME_FULL : SUPINE_VOLUME_REST);
-  const bool measured = fabs(held - in_scan[lung]) < 0.05;
-  const bool assumed = !measured && other && spread != NULL;
-  const double ratio = assumed ? exp(supine_number_parse(spread, NULL)) : 1.0;
-  const char *source = "computed";
-  if (measured) {
-    source = "measured";
-  } else if (assumed) {
-    source = "assumed";
-  } else if (other || kind == SUPINE_VOLUME_ABSOLUTE) {
-    source = "given";
-  }
-  return (supine_held){.value = held,
-                       .low = above + (held - above) / ratio,
-                       .high = above + (held - above) * ratio,
-                       .assumed = assumed,
-                       .source = source};
 }

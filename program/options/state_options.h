@@ -125,15 +125,4 @@ supine_status supine_options_pose(const supine_basis *basis, const char *command
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error);
 
-/* Volume of a lung, mL, and its range. */
-typedef struct supine_held {
-  double value, low, high;
-  bool assumed;
-  const char *source; /* "measured" in the scan, "given" in mL or by --resting, "assumed" from other
-                         people, or "computed" from the scan or from a given volume */
-} supine_held;
-
-supine_held supine_options_held(const supine_basis *basis, const supine_state *state,
-                                const supine_pose *pose, size_t lung);
-
 #endif

@@ -10,6 +10,7 @@
 #include <supine/compare.h>
 
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 #include "program/options/hilum.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -70,9 +71,8 @@ static inline double supine_report_expansion(const supine_slab *slab) {
   return slab->volume > 0.0 ? slab->gain / slab->volume : 0.0;
 }
 
-/* Return the volume of a lung in a posture as {value, low, high, source}, or as text. */
-json_t *supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung,
-                           bool as_text);
+/* Return the volume of a lung in a posture, mL. */
+supine_fact supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung);
 
 /* Print the comparison to standard output, as JSON or as text with tables of the postures. */
 void supine_report_print(const supine_comparison *comparison, bool json);

@@ -154,8 +154,9 @@ static json_t *make_lungs(const supine_comparison *c, size_t posture) {
   json_t *lungs = json_array();
   find_changes(c, posture, percent);
   for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
-    const supine_held held = supine_options_held(c->basis, &p->item->state, &p->pose, lung);
-    json_t *range = held.assumed ? json_sprintf("%.0f to %.0f", held.low, held.high) : json_null();
+    const supine_fact held = supine_report_held(c, posture, lung);
+    json_t *range = isfinite(held.low) ? json_sprintf("%.0f to %.0f", held.low, held.high)
+                                       : json_string(supine_fact_source_name(held.source));
     (void)json_array_append_new(
         lungs, json_pack("{s:o, s:o, s:o, s:s*}", "range", range, "ml",
                          json_sprintf("%.0f", p->volume[lung]), "percent",

@@ -39,18 +39,22 @@ static void add_fact(json_t *list, const char *name, json_t *value) {
   (void)json_array_append_new(list, json_pack("{s:s, s:o}", "name", name, "value", value));
 }
 
-/* Return the value of {{provenance}}: the command, the program, the basis and its metadata. */
+/* Return the value of {{provenance}}: the command, the program, the basis, what it assumes and was
+ * given, and its metadata. */
 static json_t *provenance(const supine_comparison *c, json_t *file, json_t *today) {
-  static const char *const keys[][2] = {
-      {"made_by", "basis made by"},     {"assumed", "assumed"},
-      {"scanned", "state in the scan"}, {"law", "law"},
-      {"patient", "patient"},           {"error_rms_percent", "compression error, RMS, %"},
-      {"attribution", "attribution"},   {"checksum", "checksum"}};
+  static const char *const keys[][2] = {{"made_by", "basis made by"},
+                                        {"patient", "patient"},
+                                        {"error_rms_percent", "compression error, RMS, %"},
+                                        {"attribution", "attribution"},
+                                        {"checksum", "checksum"}};
   json_t *list = json_array();
   add_fact(list, "command", json_string(c->made_by));
   add_fact(list, "program",
            json_sprintf("supine " SUPINE_VERSION ", %s", json_string_value(today)));
   add_fact(list, "basis", json_incref(file));
+  json_t *facts = supine_options_facts(c->basis, true);
+  (void)json_array_extend(list, facts);
+  json_decref(facts);
   for (size_t i = 0; i < sizeof keys / sizeof *keys; ++i) {
     const char *value = supine_basis_metadata(c->basis, keys[i][0]);
     if (value != NULL) {
@@ -94,6 +98,8 @@ static json_t *values(const supine_comparison *c) {
   SUPINE_C_LOCALE;
   char title[256];
   char volume[160];
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(c->basis, caveats, sizeof caveats);
   supine_options_basis_title(c->path, title, sizeof title);
   json_t *file = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
@@ -101,7 +107,7 @@ static json_t *values(const supine_comparison *c) {
   json_t *traced = traces(c);
   return json_pack(
       "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, s:s*, "
-      "s:b, s:o*, s:o*}",
+      "s:s, s:o*, s:o*}",
       "provenance", provenance(c, file, today), "file", file, "date", today, "count",
       json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
       volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
@@ -110,8 +116,7 @@ static json_t *values(const supine_comparison *c) {
       lungs(c), "footnotes", supine_report_footnotes(c), "reference", c->reference.name, "targets",
       matrix(c, false, "target, mm"), "traces", traced, "lobes", matrix(c, true, "structure"),
       "meaning", c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL,
-      "assumed", supine_basis_metadata(c->basis, "resting_known") == NULL, "outlined",
-      traced == NULL ? outlined(c) : NULL, "ventilation",
+      "caveats", caveats, "outlined", traced == NULL ? outlined(c) : NULL, "ventilation",
       c->breath > 0.0 ? json_pack("{s:o}", "profile", supine_report_profile(c)) : NULL);
 }
 

@@ -22,26 +22,18 @@ static json_t *by_lung(const supine_comparison *c, const double *values) {
   return list;
 }
 
-json_t *supine_report_held(const supine_comparison *c, size_t posture, size_t lung, bool as_text) {
-  SUPINE_C_LOCALE;
+supine_fact supine_report_held(const supine_comparison *c, size_t posture, size_t lung) {
   const supine_compared_posture *of = &c->posture[posture];
-  const supine_held held = supine_options_held(c->basis, &of->item->state, &of->pose, lung);
-  if (!as_text) {
-    return json_pack("{s:f, s:f, s:f, s:s}", "value", held.value, "low", held.low, "high",
-                     held.high, "source", held.source);
-  }
-  if (held.assumed) {
-    return json_sprintf("%.0f (%.0f to %.0f, %s)", held.value, held.low, held.high, held.source);
-  }
-  return json_sprintf("%.0f (%s)", held.value, held.source);
+  return supine_basis_lung_volume(c->basis, &of->item->state, &of->pose, lung);
 }
 
 static json_t *volumes(const supine_comparison *c, size_t posture, bool as_text) {
   const supine_basis_info *info = supine_basis_get_info(c->basis);
   json_t *list = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    const supine_fact held = supine_report_held(c, posture, lung);
     (void)json_object_set_new(list, info->lung_names[lung],
-                              supine_report_held(c, posture, lung, as_text));
+                              supine_options_volume_json(&held, as_text));
   }
   return list;
 }

@@ -24,6 +24,22 @@ export interface Target {
   anatomy: boolean;
 }
 
+/** What a basis assumes or was given. `value` has the unit `unit`; `low` and `high` are one standard deviation to either
+ * side; numbers that there are not are NaN. `text` holds words, such as the state in the scan. `origin` continues `source`:
+ * "assumed" "from healthy people". `line` is value and source as one text. Views must name facts with a `caveat`. */
+export interface Fact {
+  name: string;
+  text: string;
+  value: number;
+  low: number;
+  high: number;
+  unit: string;
+  source: 'given' | 'measured' | 'fitted' | 'simulated' | 'assumed' | 'computed' | 'collapsed';
+  origin: string;
+  line: string;
+  caveat: boolean;
+}
+
 /** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to
  * `positions` and `normals`. Lengths are in mm, volumes in mL, axes are LPS: +x left, +y posterior, +z head. */
 export interface Basis {
@@ -35,6 +51,10 @@ export interface Basis {
   /** The vertices of each lung: index of the first, and index after the last. */
   readonly lungs: Record<string, [number, number]>;
   readonly metadata: Record<string, string>;
+  /** What the basis assumes and was given, in the order of supine_basis_facts. */
+  readonly facts: Fact[];
+  /** All facts with a caveat as one line, which views of the lungs must show. */
+  readonly caveats: string;
   /** Positions [3 N], mm, of the last `deform` or `deformLit`; at first the reference positions. */
   readonly positions: Float32Array;
   /** Unit normals [3 N] of the last `deformLit`. */

@@ -21,6 +21,8 @@ const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a s
 export const UNSEALED = 'xxh64:0000000000000000';
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.
 const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
+// Byte offsets of members of supine_fact, its size, and the largest number of facts.
+const FACT = { value: 0, name: 24, unit: 28, origin: 32, source: 36, text: 40, size: 208, most: 32 };
 // Types of tensors, in the order of supine_dtype.
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array, Uint16Array];
 const STATUS = [
@@ -69,7 +71,7 @@ function meanOf({ count, at, move, expectedError, ...target }) {
 
 class Basis {
   #c; #basis; #lit; #hasVolume; #uniforms; #frames;
-  #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected;
+  #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected; #facts;
 
   constructor(instance, bytes, options) {
     this.#c = instance.exports;
@@ -81,6 +83,7 @@ class Basis {
     this.#positions = this.#allocate(12 * this.vertexCount);
     this.#normals = this.#allocate(12 * this.vertexCount);
     this.#expected = this.#allocate(4 * this.vertexCount);
+    this.#facts = this.#allocate(FACT.size * FACT.most);
     this.#lit = this.#word(info + INFO.normals) > 0;
     this.#readLungs(info);
     this.#makeUniforms();
@@ -242,6 +245,28 @@ class Basis {
     this.#evaluate(this.#c.supine_basis_volumes(this.#basis, this.#pose, this.#volumes));
     const volumes = this.#view(Float64Array, this.#volumes, 16);
     return Object.fromEntries(Object.keys(this.lungs).map((name, i) => [name, volumes[i]]));
+  }
+
+  get facts() {
+    const at = this.#facts;
+    const count = this.#c.supine_basis_facts(this.#basis, at);
+    return Array.from({ length: count }, (_, i) => this.#fact(at + FACT.size * i));
+  }
+
+  #fact(at) {
+    const [name, unit, origin, source] = this.#view(Uint32Array, at + FACT.name, 4);
+    const [value, low, high] = this.#view(Float64Array, at + FACT.value, 3);
+    this.#c.supine_fact_print(at, this.#text, TEXT);
+    return {
+      name: this.#string(name), text: this.#string(at + FACT.text), value, low, high, unit: this.#string(unit),
+      source: this.#string(this.#c.supine_fact_source_name(source)), origin: this.#string(origin),
+      line: this.#string(this.#text), caveat: this.#c.supine_fact_is_caveat(at) !== 0,
+    };
+  }
+
+  get caveats() {
+    this.#c.supine_basis_caveats(this.#basis, this.#facts, FACT.size * FACT.most);
+    return this.#string(this.#facts);
   }
 
   get error() {

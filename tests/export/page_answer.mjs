@@ -35,6 +35,7 @@ for (const [who, text, hidden] of bars) {
   assert.equal(hidden, false);
 }
 assert.equal(await page.locator('#holds-source').textContent(), 'assumed from healthy people');
+assert.match(await page.locator('#caveats').textContent(), /assumed: .*volume at rest, supine \d+ mL \(\d+ to \d+\)/);
 await press(page, '3');
 await settled(page);
 

@@ -849,11 +849,11 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"output", "c.safetensors", 0, "c.safetensors: fields"},
                {"band", "0", 0, "band 0, 1 mode"},
                {"modes", "2", 0, "2 modes"},
-               {"axes", "LPS", 0, "LPS axes (as given)"},
+               {"axes", "LPS", 0, "axes of the scan: LPS, 10 mm a unit, given\n"},
                {"units", "in", 0, "25.4 mm a unit"},
                {"without-normals", "", 0, "b.safetensors: fields"},
                {"midline", "60", 2, "midline"},
-               {"scanned", "supine", 0, "  scan supine\n"},
+               {"scanned", "supine", 0, "state in the scan: supine, "},
                {"labels", "lungmask", 1, "are for label maps"},
                {"edge", "3", 1, "are for label maps"},
                {"close", "3", 1, "are for label maps"},
@@ -881,7 +881,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"lesion", "0,0,0,9,2", 1, no_effect},
                {"lung", "left:0.3", 1, no_effect}};
   write_input();
-  EXPECT(0, "  scan taken as the lungs without gravity\n", FIELDS);
+  EXPECT(0, "state in the scan: the lungs without gravity, ", FIELDS);
   EXPECT(0, "Usage", "precompute --help-all");
   char *help = strdup(printed);
   size_t listed = 0;
@@ -908,7 +908,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
 /* Print the displacement of the first vertex in a posture of b.safetensors, which is g in mm. */
 TEST(test_precompute_fields_scanned_posture_not_displaced) {
   write_input();
-  EXPECT(0, "  scan supine\n", FIELDS "--scanned supine");
+  EXPECT(0, "state in the scan: supine, ", FIELDS "--scanned supine");
   EXPECT(0, "largest displacement below 0.002 mm",
          "deform b.safetensors --posture supine -o a.ply");
   EXPECT(0, "largest displacement 2.000 mm", "deform b.safetensors --posture prone -o a.ply");

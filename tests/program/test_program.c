@@ -199,20 +199,20 @@ static double positions_apart(const char *first, const char *second) {
 TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(0, "-2000.00 mL",
          "deform lungs.safetensors --posture supine --volume scan-2000 -o low.ply");
-  EXPECT(0, "scan supine at full inflation - 2000 mL, 4000 mL\n  full inflation 6000 mL",
+  EXPECT(0, "in the scan: supine at full inflation - 2000 mL, 4000 mL, given\n  full inflation, supine: 6000 mL",
          "precompute low.ply --scanned full-2000 --band 7 -o low.safetensors");
-  EXPECT(0, "in every state but the scan: to 4653 mL", /* 0.5 of 2695.0 mL is missing */
+  EXPECT(0, "supine: 4653 mL, computed from the scan", /* 0.5 of 2695.0 mL is missing */
          "precompute lungs.ply --lung left:0.5 --modes 1 --held-out 20 -o r.safetensors");
   EXPECT(0, "from prone at rest", "deform lungs.safetensors --posture left --from prone -o a.ply");
   EXPECT(1, "--resting: 'foo' is not a posture",
          "precompute lungs.ply --resting foo=0.4 -o r.safetensors");
-  EXPECT(0, "rest supine 2885 mL (2442 to 3408 by healthy people's share)", "info low.safetensors");
+  EXPECT(0, "2885 mL (2442 to 3408), assumed from healthy people", "info low.safetensors");
   EXPECT(0, "low.obj", "deform low.safetensors --posture supine --volume scan -o low.obj");
   EXPECT(0, "displacement below 0.002 mm from the scan",
          "deform low.safetensors --posture supine --volume scan --from scan -o low.obj");
   EXPECT(0, "displacement below 0.002 mm from supine at full inflation",
          "deform low.safetensors --posture prone --volume full --from full -o low.obj");
-  EXPECT(0, "RAS axes (as given), 10 mm a unit",
+  EXPECT(0, "axes of the scan: RAS, 10 mm a unit, given\n",
          "precompute low.ply --axes RAS --units cm --band 3 -o ras.safetensors");
   EXPECT(0, "ras.ply",
          "deform ras.safetensors --posture prone --volume scan --as-scanned -o ras.ply");
@@ -248,13 +248,13 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
          "warning: at full inflation the lungs hold 3000 mL (an adult's 4566 to 8525 mL), at rest "
          "582 mL of gas",
          "precompute lungs.ply --units 0.7937005 --band 2 -o a.safetensors");
-  EXPECT(0, "(expected 7300)\n  rest supine 3000 mL (by the given volumes)",
+  EXPECT(0, "volume at rest, supine: 3000 mL, given\n",
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
   EXPECT(0, "3000.00 mL (-3000.00 mL)", "deform a.safetensors --posture supine -o a.ply");
   EXPECT(0, "the scan holds 4000 mL, but its state and the volume at rest say 3000 mL",
          "precompute low.ply --scanned rest --resting supine=3000mL --band 2 -o a.safetensors");
-  EXPECT(0, "supine at rest, 4000 mL\n  full inflation 5200 mL (given",
+  EXPECT(0, "supine at rest, 4000 mL, given\n  full inflation, supine: 5200 mL, given\n",
          "precompute low.ply --scanned supine:rest --full 5200mL --band 3 -o a.safetensors");
   EXPECT(0, "below 0.002 mm from the scan, 4000.00",
          "deform a.safetensors --posture supine -o a.ply");
@@ -262,11 +262,11 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "does not belong to lungs of 3000 mL",
          "precompute low.ply --scanned supine:rest --full 3000mL -o b.safetensors");
   EXPECT(1, "is for a scan at rest", "precompute low.ply --full 5200mL -o b.safetensors");
-  EXPECT(0, "rest supine 3553 mL (3007 to 4197 by height and sex",
+  EXPECT(0, "3553 mL (3007 to 4197), assumed from height and sex",
          "precompute lungs.ply --height 178 --sex male --band 2 -o a.safetensors");
   EXPECT(1, "check the height and the state of the scan",
          "precompute lungs.ply --units 0.8 --height 178 --sex male --band 2 -o b.safetensors");
-  EXPECT(0, "deep law\n  scan supine at rest",
+  EXPECT(0, "law of displacement: deep",
          "precompute low.ply --scanned supine:rest --band 3 -o a.safetensors");
   EXPECT(1, "deep or paper", "precompute low.ply --law shallow -o b.safetensors");
   EXPECT(1, "leave --scanned out",
@@ -274,7 +274,7 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   /* The scan was taken at rest, so the surface at rest equals the scan. */
   EXPECT(0, "mL", "deform a.safetensors --posture supine -o rested.ply");
   assert_true(positions_apart("low.ply", "rested.ply") < 0.005);
-  EXPECT(0, "paper law\n  scan taken as the reference",
+  EXPECT(0, "state in the scan: the reference of every posture",
          "precompute lungs.ply --law paper --band 3 -o a.safetensors");
   EXPECT(0, "+500.00 mL", "deform a.safetensors --posture prone -o a.ply");
   assert_int_equal(count_files("b."), 0);

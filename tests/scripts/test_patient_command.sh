@@ -144,7 +144,7 @@ grep -q 'the volume at rest' note && fail "a volume as in COPD is told: $(cat no
 grep -q '2885 mL counts as rest, that of 6000 mL as full inflation' note || fail "volumes alone: $(cat note)"
 "$supine" precompute s_supine_rest.ply --scanned supine:rest --patient known.json -o known.safetensors >out 2>&1 ||
   fail "precompute volumes alone: $(cat out)"
-grep -q 'full inflation 6[0-9]* mL (from rest' out || fail "full inflation is lost: $(cat out)"
+grep -q 'full inflation, supine: 6[0-9]* mL, computed from rest' out || fail "full inflation is lost: $(cat out)"
 "$supine" fit --landmarks full.csv --rest 2885mL --other 3300mL -o x.json >out 2>&1 &&
   grep -q 'as a breath above it' out || fail "a breath: $(cat out)"
 "$supine" fit --landmarks full.csv --rest supine:rest --other supine:full -o x.json >out 2>&1 &&

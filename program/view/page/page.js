@@ -339,7 +339,7 @@ async function start() {
     if (!moment.held) return;
     const measured = told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
     holds.show(basis, moment.held, told.depth, from.held, lungHeights(state.gravity));
-    write('holds-source', basis.metadata.resting_spread ? 'assumed from healthy people' : '');
+    write('holds-source', basis.facts.filter(({ name, source }) => source === 'collapsed' || name.startsWith('volume at rest')).map(({ source, origin }) => `${source} ${origin}`).join('; '));
     write('holds-text', `Tick: ${from.name}. Dot: now.${basis.metadata.resting_spread ? ' Band: one SD between people.' : ''}${measured ? ` Published change: ${measured}.` : ''}`);
   }
 
@@ -761,7 +761,8 @@ async function start() {
   write('depth-name', `Above ${restOrScan}`);
   write('ghost-name', 'Ghost of the reference');
   write('patient-fit', basis.metadata.patient ? `fitted to this patient: ${basis.metadata.patient}` : '');
-  write('state', basis.fields ? `another simulator\u2019s fields of gravity${basis.order > 0 ? ' and volume' : ''}, compressed: error ${errorOf(basis)}` : `at ${basis.hasRest ? 'rest, after a quiet expiration' : 'the volume of the scan'}; ${/scan at [^;()]*/.exec(basis.metadata.assumed)?.[0].replace('scan at', 'scan assumed at').trim() ?? ''}`.replace(/; $/, ''));
+  write('state', basis.fields ? `another simulator\u2019s fields of gravity${basis.order > 0 ? ' and volume' : ''}, compressed: error ${errorOf(basis)}` : `at ${basis.hasRest ? 'rest, after a quiet expiration' : 'the volume of the scan'}`);
+  write('caveats', basis.caveats);
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;
@@ -827,7 +828,7 @@ function showFacts(basis) {
     ['surface', `${basis.lungNames.join(' and ')}, ${basis.vertices.toLocaleString('en')} vertices${basis.wholeVertices > basis.vertices ? ` of ${basis.wholeVertices.toLocaleString('en')}` : ''}`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
     ['error', errorOf(basis)],
-    ['law', metadata.law], ['scan', metadata.scanned], ['force', metadata.force], ['stiffness', metadata.stiffness],
+    ...basis.facts.map(({ name, line }) => [name, line]), ['force', metadata.force],
     ['made by', metadata.made_by], ['credit', metadata.attribution],
   ];
   $('facts').replaceChildren(...facts.filter(([, value]) => value).flatMap(([name, value]) => {

@@ -75,7 +75,9 @@ typedef struct layout {
   double margin;
   double cell_width, cell_height;
   double heading_height;
-  double footer_height; /* height of the area below the cells, which holds the colour bar */
+  double footer_height;  /* height of the area below the cells, which holds the colour bar */
+  double caption_height; /* height of the lowest part of the footer, which holds the caption */
+  size_t caption_lines;
 } layout;
 
 /* What draws a picture. */
@@ -360,7 +362,8 @@ static void footer(const painter *by) {
   const supine_picture *picture = by->picture;
   const double width = (double)picture->width;
   const letters face = {fmax(10.0, 0.6 * by->at.font), false};
-  const double y = (double)picture->height - 0.45 * by->at.footer_height;
+  const double y =
+      (double)picture->height - by->at.caption_height - 0.45 * by->at.footer_height;
   const double edge = by->at.font;
   double used = 0.0;
   colour(by->cr, by->theme->faint);
@@ -381,7 +384,8 @@ static void colour_bar(const painter *by) {
   const double step = supine_render_bar_step(picture->largest);
   const double width = fmin((double)picture->width - 2 * at->margin, 34 * at->font);
   const double x = ((double)picture->width - width) / 2;
-  const double y = (double)picture->height - at->footer_height + at->font * 1.65;
+  const double y =
+      (double)picture->height - at->caption_height - at->footer_height + at->font * 1.65;
   const double height = at->font * 0.8;
   cairo_pattern_t *fade = cairo.pattern_create_linear(x, 0, x + width, 0);
   for (int i = 0; i <= STOPS; ++i) {
@@ -414,6 +418,52 @@ static void colour_bar(const painter *by) {
   }
 }
 
+/* Size of the letters of a caption, and the distance of its lines, relative to the font. */
+static const double caption_size = 0.6;
+static const double caption_step = 0.75;
+
+/* Draw the caption. Break it into lines at blanks; reduce the letters of the last line if it needs
+ * more lines than the layout has. */
+static void caption(const painter *by) {
+  const layout *at = &by->at;
+  const letters face = {at->font * caption_size, false};
+  const char *next = by->picture->caption;
+  const double room = (double)by->picture->width - 2 * at->margin;
+  double y = (double)by->picture->height - at->caption_height + 0.3 * at->font;
+  colour(by->cr, by->theme->faint);
+  for (size_t i = 0; i < at->caption_lines && *next != '\0'; ++i) {
+    char line[512];
+    size_t fits = 0;
+    for (size_t length = 1; length < sizeof line - 1 && next[length - 1] != '\0'; ++length) {
+      if (next[length] == ' ' || next[length] == '\0') {
+        (void)snprintf(line, sizeof line, "%.*s", (int)length, next);
+        if (fits > 0 && i + 1 < at->caption_lines &&
+            supine_render_letters_width(by->cr, &face, line) > room) {
+          break;
+        }
+        fits = length;
+      }
+    }
+    (void)snprintf(line, sizeof line, "%.*s", (int)fits, next);
+    y += at->font * caption_step;
+    (void)fitted_text(by->cr, at->margin, y, &face, room, line);
+    next += next[fits] == ' ' ? fits + 1 : fits;
+  }
+}
+
+/* Plan the lines of a caption from the usual width of letters. */
+static void plan_caption(const supine_picture *picture, layout *at) {
+  static const double letter = 0.52; /* width of a letter, relative to its size */
+  const double room = (double)picture->width - 2 * at->margin;
+  at->caption_lines = 0;
+  at->caption_height = 0;
+  if (picture->caption != NULL && picture->caption[0] != '\0') {
+    at->caption_lines =
+        1 + (size_t)((double)strlen(picture->caption) * letter * caption_size * at->font / room);
+    at->caption_height = at->font * (caption_step * (double)at->caption_lines + 0.7);
+  }
+}
+
 static layout make_layout(const supine_picture *picture) {
   layout at;
   const double width = (double)picture->width;
@@ -422,18 +472,20 @@ static layout make_layout(const supine_picture *picture) {
   const double rows = (double)picture->view_count;
   at.font = fmin(28, fmin(width / columns / 19, height / rows / 24));
   at.margin = at.font * 0.9;
+  plan_caption(picture, &at);
   if (picture->look == SUPINE_LOOK_SHELL) {
     at.heading_height = at.font * 4.1;
     at.footer_height = at.font * 1.6;
     at.cell_width = floor(width / columns);
-    at.cell_height = (height - at.footer_height) / rows;
+    at.cell_height = (height - at.footer_height - at.caption_height) / rows;
     return at;
   }
   const double gap = at.margin / 2;
   at.heading_height = at.font * 5.2;
   at.footer_height = at.font * 4.6;
   at.cell_width = (width - 2 * at.margin - gap * (columns - 1)) / columns;
-  at.cell_height = (height - at.margin - at.footer_height - gap * (rows - 1)) / rows;
+  at.cell_height =
+      (height - at.margin - at.footer_height - at.caption_height - gap * (rows - 1)) / rows;
   return at;
 }
 
@@ -485,6 +537,9 @@ static supine_status compose(const painter *by, supine_error *error) {
     colour_bar(by);
   } else {
     footer(by);
+  }
+  if (by->at.caption_lines > 0) {
+    caption(by);
   }
   return SUPINE_OK;
 }

@@ -161,6 +161,7 @@ typedef struct supine_picture {
   const char *bar_label;
   const char *legend;        /**< below a shell, on the left: what its signs mean; NULL for none */
   const char *remark;        /**< below a shell, on the right; NULL for none */
+  const char *caption;       /**< small text below all, broken into lines; or NULL */
   supine_look look;          /**< a shell has a dark background, and no colour bar */
   double largest;            /**< value that the last colour shows, mm */
   const double (*extent)[4]; /**< [view_count] smallest and largest x, then y, of each view, mm;

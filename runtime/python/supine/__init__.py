@@ -34,7 +34,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
 from ._program import save_fields
 
 __all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
-           "Pose", "Location", "Target", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
+           "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -213,6 +213,26 @@ class Target(NamedTuple):
     anatomy: bool
 
 
+class Fact(NamedTuple):
+    """What a basis assumes or was given: `value` in `unit`, with its range, one standard deviation to either side; numbers
+    that there are not are NaN. `text` holds words, such as the state in the scan. `source` is "given", "measured",
+    "fitted", "simulated", "assumed", "computed" or "collapsed", and `origin` continues it ("from healthy people"). Views of
+    the lungs must name facts with a `caveat`."""
+    name: str
+    text: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    source: str
+    origin: str
+    caveat: bool
+    line: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.line}"
+
+
 class Basis:
     """An open basis file, made by `supine.open`. It is closed when nothing uses it any more.
 
@@ -287,6 +307,27 @@ class Basis:
     def tensor(self, name: str) -> Optional[NDArray[Any]]:
         """Return a tensor of the file as a view; None if the file has no tensor of that name."""
         return self._tensor(name) if _c.basis_tensor(self._c, name.encode()) else None
+
+    @property
+    def facts(self) -> list[Fact]:
+        """What the basis assumes and was given, as `supine info` lists it."""
+        facts = (_c.Fact * _c.FACTS_MAX)()
+        count = _c.basis_facts(self._c, facts)
+        line = ctypes.create_string_buffer(320)
+        made = []
+        for fact in facts[:count]:
+            _c.fact_print(fact, line, len(line))
+            made.append(Fact(_c.string(fact.name), _c.string(fact.text), fact.value, fact.low, fact.high, _c.string(fact.unit),
+                             _c.string(_c.fact_source_name(fact.source)), _c.string(fact.origin),
+                             _c.fact_is_caveat(fact), _c.string(line.value)))
+        return made
+
+    @property
+    def caveats(self) -> str:
+        """All facts with a caveat as one line, which views of the lungs must show."""
+        line = ctypes.create_string_buffer(1200)
+        _c.basis_caveats(self._c, line, len(line))
+        return _c.string(line.value)
 
     @property
     def faces(self) -> NDArray[np.int64]:

@@ -10,7 +10,7 @@ from typing import Any, Optional
 
 from . import _remedies
 
-MODES_MAX, LUNGS_MAX = 256, 16
+MODES_MAX, LUNGS_MAX, FACTS_MAX = 256, 16, 32
 
 
 def _path(name: str) -> Optional[str]:
@@ -133,6 +133,12 @@ DTYPES = (ctypes.c_uint8, c_uint32, c_float, c_double, c_int16, ctypes.c_int8, c
 class Metadata(ctypes.Structure):
     """The C struct supine_metadata."""
     _fields_ = [("key", c_char_p), ("value", c_char_p)]
+
+
+class Fact(ctypes.Structure):
+    """The C struct supine_fact."""
+    _fields_ = [("value", c_double), ("low", c_double), ("high", c_double), ("name", c_char_p), ("unit", c_char_p),
+                ("origin", c_char_p), ("source", c_int), ("text", c_char * 164)]
 
 
 class Breath(ctypes.Structure):
@@ -320,6 +326,11 @@ basis_pose_gain = _checked("basis_pose_gain", c_void_p, c_double * 3, c_double, 
 basis_scan_pose = _checked("basis_scan_pose", c_void_p, GivenPose)
 basis_volumes = _posed("basis_volumes", c_void_p, GivenPose, c_void_p)
 basis_coefficients = _posed("basis_coefficients", c_void_p, c_size_t, c_size_t, c_void_p)
+basis_facts = _declare("basis_facts", c_size_t, c_void_p, POINTER(Fact))
+basis_caveats = _declare("basis_caveats", c_size_t, c_void_p, c_char_p, c_size_t)
+fact_print = _declare("fact_print", c_size_t, POINTER(Fact), c_char_p, c_size_t)
+fact_is_caveat = _declare("fact_is_caveat", c_bool, POINTER(Fact))
+fact_source_name = _declare("fact_source_name", c_char_p, c_int)
 basis_error = _declare("basis_error", c_double, c_void_p, GivenPose)
 deform_range = _posed("deform_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)
 displace_range = _posed("displace_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p)

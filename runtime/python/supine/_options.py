@@ -231,4 +231,4 @@ def describe(result: _c.Result) -> str:
     if report.turning_rms > 0:
         errors += f"  {100 * report.turning_rms:.3g} % RMS, of the part of the displacement that depends on gravity\n"
     return (f"{lungs}, {report.vertex_count} vertices, band {report.band}, {report.mode_count} modes\n"
-            f"assumed:\n{assumed}{against}:\n{errors}")
+            f"assumed and given:\n{assumed}{against}:\n{errors}")
