@@ -95,7 +95,6 @@ static supine_status read_lesion(const char *text, void *field, supine_error *er
 /* Read a collapsed lung and the share of its volume that remains, such as "left:0.3". */
 static supine_status read_lung(const char *text, void *field, supine_error *error) {
   supine_precompute_tissue *tissue = &((supine_model_options *)field)->precompute.tissue;
-  (void)error;
   const bool left = strncmp(text, "left:", strlen("left:")) == 0;
   double share;
   if (!(left || strncmp(text, "right:", strlen("right:")) == 0) ||
@@ -103,6 +102,8 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
       !(share > 0.0 && share <= 1.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
+  SUPINE_REFUSE_IF(tissue->share[left ? 0 : 1] > 0.0, error, SUPINE_ERROR_ARGUMENT,
+                   "the %s lung is given twice: give its share once", left ? "left" : "right");
   tissue->share[left ? 0 : 1] = share;
   return SUPINE_OK;
 }
