@@ -228,11 +228,11 @@ static size_t split_unit(const char *field, char unit[16]) {
     return length;
   }
   (void)snprintf(unit, 16, "%.*s", (int)(field + length - 1 - (open + 1)), open + 1);
-  size_t end = (size_t)(open - field);
-  while (end > 0 && supine_ascii_is_space(field[end - 1])) {
-    --end;
+  size_t length_of_name = (size_t)(open - field);
+  while (length_of_name > 0 && supine_ascii_is_space(field[length_of_name - 1])) {
+    length_of_name -= 1;
   }
-  return end;
+  return length_of_name;
 }
 
 /* Find the expected column of a field of the header, and its unit; `count` if it is none. */
