@@ -72,12 +72,19 @@ static bool is_open_after(const char *line, const char *separators, bool open) {
   return open;
 }
 
+/* Return the characters that are removed from both ends of a record: blanks, and tabs unless they
+ * may separate fields, of which the first and the last may be empty. */
+static const char *blanks_of(const supine_csv *csv) {
+  return csv->separator == '\t' || csv->separator == '\0' ? " \r\n\v\f" : " \t\r\n\v\f";
+}
+
 /* Set `text` to the next record, trimmed; NULL at the end. It is a line that is neither blank nor a
  * comment, with the lines after it that its quoted fields contain. */
 static supine_status csv_line(supine_csv *csv, char **text, supine_error *error) {
   const char own[] = {csv->separator, '\0'};
   const char *separators = csv->separator != '\0' ? own : ",;\t";
   size_t used = 0;
+  const char *first = NULL; /* first character that is not blank */
   do {
     SUPINE_TRY(read_line(csv, 0, &used, error));
     *text = NULL;
@@ -87,8 +94,9 @@ static supine_status csv_line(supine_csv *csv, char **text, supine_error *error)
     csv->line = csv->lines_read;
     static const char mark[] = "\xEF\xBB\xBF"; /* byte-order mark of UTF-8 */
     const size_t skip = csv->line == 1 && strncmp(csv->text, mark, 3) == 0 ? 3 : 0;
-    *text = csv->text + skip + strspn(csv->text + skip, " \t\r\n\v\f");
-  } while (**text == '\0' || **text == '#');
+    *text = csv->text + skip + strspn(csv->text + skip, blanks_of(csv));
+    first = *text + strspn(*text, " \t\r\n\v\f");
+  } while (*first == '\0' || *first == '#');
   const size_t begin = (size_t)(*text - csv->text);
   size_t length = used;
   bool open = is_open_after(*text, separators, false);
@@ -99,7 +107,10 @@ static supine_status csv_line(supine_csv *csv, char **text, supine_error *error)
     open = is_open_after(csv->text + used, separators, true);
     used += length;
   }
-  *text = trim(csv->text + begin);
+  *text = csv->text + begin;
+  for (size_t end = strlen(*text); end > 0 && strchr(blanks_of(csv), (*text)[end - 1]) != NULL;) {
+    (*text)[--end] = '\0';
+  }
   SUPINE_REFUSE_IF(!supine_text_is_utf8(*text), error, SUPINE_ERROR_FORMAT,
                    "%s:%zu: the text is not UTF-8: save the file with the encoding UTF-8",
                    csv->path, csv->line);
@@ -173,19 +184,78 @@ static char find_separator(const char *text) {
   return separators[best];
 }
 
+/* Return the separator of a line such as "sep=;" before the header, as Excel writes it; NUL if the
+ * line is another one. */
+static char stated_separator(const char *line) {
+  char separator = '\0';
+  if (line != NULL && supine_ascii_same_begin(line, "sep=", 4) && strlen(line) <= 5) {
+    separator = line[4] != '\0' ? line[4] : '\t';
+  }
+  return separator;
+}
+
 /* Read the line of the header, and find the separator. */
 static supine_status read_header(supine_csv *csv, const char *name, char **text,
                                  supine_error *error) {
   SUPINE_TRY(csv_line(csv, text, error));
-  const bool stated = *text != NULL && strncmp(*text, "sep=", 4) == 0 && strlen(*text) == 5;
-  if (stated) { /* of Excel */
-    csv->separator = (*text)[4];
+  const char stated = stated_separator(*text);
+  if (stated != '\0') {
+    csv->separator = stated;
     SUPINE_TRY(csv_line(csv, text, error));
   }
   SUPINE_REFUSE_IF(*text == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: the file is empty; expected a header %s,...", csv->path, name);
-  if (!stated) {
+  if (stated == '\0') {
     csv->separator = find_separator(*text);
+  }
+  return SUPINE_OK;
+}
+
+/* Units that a column may name, in mm, mL, s or cmH2O. */
+static const struct {
+  const char *name;
+  double factor;
+} units[] = {{"mm", 1.0}, {"cm", 10.0},  {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}, {"mL", 1.0},
+             {"ml", 1.0}, {"L", 1000.0}, {"l", 1000.0}, {"s", 1.0},   {"ms", 1e-3}, {"cmH2O", 1.0}};
+
+/* Return the length of a column's name without the unit in brackets behind it, such as "x (mm)".
+ * Set `unit` to the unit without brackets, "" if there is none. */
+static size_t split_unit(const char *field, char unit[16]) {
+  const size_t length = strlen(field);
+  const char *open = strpbrk(field, "([");
+  unit[0] = '\0';
+  if (open == NULL || open == field || strchr(")]", field[length - 1]) == NULL) {
+    return length;
+  }
+  (void)snprintf(unit, 16, "%.*s", (int)(field + length - 1 - (open + 1)), open + 1);
+  size_t length_of_name = (size_t)(open - field);
+  while (length_of_name > 0 && supine_ascii_is_space(field[length_of_name - 1])) {
+    length_of_name -= 1;
+  }
+  return length_of_name;
+}
+
+/* Find the expected column of a field of the header, and its unit; `count` if it is none. */
+static supine_status find_column(const supine_csv *csv, const char *field, const char *const *names,
+                                 size_t count, size_t *column, double *scale, supine_error *error) {
+  char unit[16];
+  const size_t length = split_unit(field, unit);
+  size_t c = 0;
+  while (c < count && !supine_ascii_same(field, names[c]) &&
+         !(strlen(names[c]) == length && supine_ascii_same_begin(field, names[c], length))) {
+    ++c;
+  }
+  *column = c;
+  *scale = 1.0;
+  if (c < count && unit[0] != '\0' && !supine_ascii_same(field, names[c])) {
+    size_t u = 0;
+    while (u < sizeof units / sizeof *units && strcmp(unit, units[u].name) != 0) {
+      ++u;
+    }
+    SUPINE_REFUSE_IF(u == sizeof units / sizeof *units, error, SUPINE_ERROR_FORMAT,
+                     "%s:%zu: the unit of column \"%s\" is unknown: give mm, mL, s or cmH2O",
+                     csv->path, csv->line, field);
+    *scale = units[u].factor;
   }
   return SUPINE_OK;
 }
@@ -199,14 +269,14 @@ static supine_status find_columns(supine_csv *csv, char *text, const char *const
   }
   for (size_t f = 0; f < csv->field_count; ++f) {
     size_t c = 0;
-    while (c < count && !supine_ascii_same(csv->field[f], names[c])) {
-      ++c;
-    }
+    double scale = 1.0;
+    SUPINE_TRY(find_column(csv, csv->field[f], names, count, &c, &scale, error));
     SUPINE_REFUSE_IF(c < count && csv->column[c] != SIZE_MAX, error, SUPINE_ERROR_FORMAT,
                      "%s:%zu: repeated column \"%s\" in the header: delete or rename one",
                      csv->path, csv->line, csv->field[f]);
     if (c < count) { /* columns that the caller does not expect are ignored */
       csv->column[c] = f;
+      csv->scale[c] = scale;
     }
   }
   for (size_t c = 0; c < required; ++c) {
@@ -218,12 +288,76 @@ static supine_status find_columns(supine_csv *csv, char *text, const char *const
   return SUPINE_OK;
 }
 
+/* Return the order of bytes that a byte-order mark of UTF-16 states: 1 if the lower byte is first,
+ * 2 if it is second, 0 if there is no mark. */
+static int order_of(FILE *file) {
+  const int first = getc(file);
+  const int second = getc(file);
+  if (first == 0xFF && second == 0xFE) {
+    return 1;
+  }
+  if (first == 0xFE && second == 0xFF) {
+    return 2;
+  }
+  rewind(file);
+  return 0;
+}
+
+/* Read the next unit of UTF-16; return false at the end of the file. */
+static bool next_unit(FILE *file, int order, unsigned *unit) {
+  const int first = getc(file);
+  const int second = first == EOF ? EOF : getc(file);
+  *unit = order == 1 ? (unsigned)first | (unsigned)second << 8
+                     : (unsigned)first << 8 | (unsigned)second;
+  return second != EOF;
+}
+
+/* Write a character as UTF-8. */
+static void put_utf8(FILE *out, unsigned code) {
+  static const unsigned begin[] = {0, 0xC0, 0xE0, 0xF0}; /* bits of the first byte */
+  const int more = (code >= 0x80 ? 1 : 0) + (code >= 0x800 ? 1 : 0) + (code >= 0x10000 ? 1 : 0);
+  (void)putc((int)(begin[more] | code >> 6 * more), out);
+  for (int k = more - 1; k >= 0; --k) {
+    (void)putc((int)(0x80 | (code >> 6 * k & 0x3F)), out);
+  }
+}
+
+/* Convert the rest of the file from UTF-16, as Excel writes "Unicode text", to UTF-8 in memory. */
+static supine_status decode(supine_csv *csv, int order, supine_error *error) {
+  size_t size = 0;
+  unsigned unit = 0;
+  FILE *out = open_memstream(&csv->decoded, &size);
+  if (out == NULL) {
+    return supine_error_memory(error, "the text of %s", csv->path);
+  }
+  while (next_unit(csv->file, order, &unit)) {
+    unsigned low = 0;
+    const bool pair = unit >= 0xD800 && unit < 0xDC00 && next_unit(csv->file, order, &low);
+    put_utf8(out, pair ? 0x10000 + ((unit & 0x3FF) << 10) + (low & 0x3FF) : unit);
+  }
+  if (fclose(out) != 0) {
+    return supine_error_memory(error, "the text of %s", csv->path);
+  }
+  FILE *text = fmemopen(csv->decoded, size > 0 ? size : 1, "rb");
+  if (text == NULL) {
+    return supine_error_memory(error, "the text of %s", csv->path);
+  }
+  (void)fclose(csv->file);
+  csv->file = text;
+  return SUPINE_OK;
+}
+
 static supine_status csv_open(const char *path, supine_csv *csv, supine_error *error) {
   *csv = (supine_csv){.path = path};
   csv->file = fopen(path, "rb");
   SUPINE_REFUSE_IF(csv->file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
                    strerror(errno));
-  return SUPINE_OK;
+  const int order = order_of(csv->file);
+  const supine_status status = order > 0 ? decode(csv, order, error) : SUPINE_OK;
+  if (status != SUPINE_OK) {
+    supine_csv_close(csv);
+  }
+  return status;
 }
 
 supine_status supine_csv_open(const char *path, const char *const *names, size_t count,
@@ -259,14 +393,29 @@ bool supine_csv_has(const supine_csv *csv, size_t column) {
   return csv->column[column] != SIZE_MAX;
 }
 
+double supine_csv_scale(const supine_csv *csv, size_t column) {
+  return csv->column[column] != SIZE_MAX ? csv->scale[column] : 1.0;
+}
+
+/* Return whether all fields of the row are empty, as in rows that a spreadsheet keeps. */
+static bool is_empty(const supine_csv *csv) {
+  bool empty = csv->field_count > 1;
+  for (size_t f = 0; f < csv->field_count; ++f) {
+    empty = empty && csv->field[f][0] == '\0';
+  }
+  return empty;
+}
+
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error) {
   char *text = NULL;
-  SUPINE_TRY(csv_line(csv, &text, error));
-  *more = text != NULL;
-  if (text == NULL) {
-    return SUPINE_OK;
-  }
-  SUPINE_TRY(csv_split(csv, text, error));
+  do {
+    SUPINE_TRY(csv_line(csv, &text, error));
+    *more = text != NULL;
+    if (text == NULL) {
+      return SUPINE_OK;
+    }
+    SUPINE_TRY(csv_split(csv, text, error));
+  } while (is_empty(csv));
   const bool more_allowed = csv->may_have_more && csv->field_count > csv->column_count;
   SUPINE_REFUSE_IF(
       csv->field_count != csv->column_count && !more_allowed, error, SUPINE_ERROR_FORMAT,
@@ -283,14 +432,15 @@ supine_status supine_csv_number(const supine_csv *csv, size_t column, const char
                                 double *number, supine_error *error) {
   char *text = csv->field[csv->column[column]];
   char *end = NULL;
-  char *comma = csv->separator == ';' ? strchr(text, ',') : NULL;
-  if (comma != NULL) { /* with ';' between fields, a comma is a decimal comma */
+  char *comma = strchr(text, ','); /* a field that has one was not split there */
+  if (comma != NULL) {
     *comma = '.';
   }
   *number = supine_number_parse(text, &end);
   SUPINE_REFUSE_IF(end == text || *end != '\0' || !isfinite(*number), error, SUPINE_ERROR_FORMAT,
                    "%s:%zu: %s \"%s\" is not a finite number: give a number", csv->path, csv->line,
                    name, text);
+  *number *= csv->scale[column];
   return SUPINE_OK;
 }
 
@@ -298,6 +448,7 @@ void supine_csv_close(supine_csv *csv) {
   supine_file_close(&csv->file);
   free(csv->text);
   free(csv->next);
+  free(csv->decoded);
   *csv = (supine_csv){0};
 }
 

@@ -11,10 +11,12 @@
 
 enum { SUPINE_CSV_FIELDS_MAX = 64 };
 
-/* A CSV file being read. It has a header, and may have comments (#), blank lines and quoted fields,
- * which may contain separators and line ends. It must be UTF-8. The separator of the header, ',',
- * ';' or tab, holds for all lines: the most frequent one, or that of a line "sep=;" before the
- * header, as Excel writes it. With ';', numbers may have a decimal comma. Zero-initialise. */
+/* A CSV file being read. It has a header, and may have comments (#), rows without text and quoted
+ * fields, which may contain separators and line ends. It must be UTF-8, or UTF-16 with a byte-order
+ * mark. The separator of the header, ',', ';' or tab, holds for all lines: the most frequent one,
+ * or that of a line "sep=;" before the header, as Excel writes it. Numbers may have a decimal comma
+ * where it does not separate fields. A column may name its unit behind its name, such as "x (cm)":
+ * numbers are then converted to mm, mL, s or cmH2O. Zero-initialise. */
 typedef struct supine_csv {
   const char *path;
   FILE *file;
@@ -30,6 +32,8 @@ typedef struct supine_csv {
   char *field[SUPINE_CSV_FIELDS_MAX];   /* fields of the current row */
   size_t column_count;                  /* number of fields of the header */
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column; SIZE_MAX if absent */
+  double scale[SUPINE_CSV_FIELDS_MAX];  /* unit of each expected column; 1 if it names none */
+  char *decoded;                        /* text of a file in UTF-16, converted to UTF-8 */
 } supine_csv;
 
 /* Open a file and read its header. `names` are the `count` columns that the caller expects. The
@@ -47,6 +51,10 @@ supine_status supine_csv_open_bare(const char *path, const char *header, const c
 
 /* Return whether the file has a column, an index into the `names` of supine_csv_open. */
 bool supine_csv_has(const supine_csv *csv, size_t column);
+
+/* Return the factor by which the numbers of a column are converted: the unit that the header names
+ * in mm, mL, s or cmH2O; 1 if it names none. */
+double supine_csv_scale(const supine_csv *csv, size_t column);
 
 /* Read the next row; set *more to false at the end. */
 supine_status supine_csv_next(supine_csv *csv, bool *more, supine_error *error);

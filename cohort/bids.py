@@ -16,6 +16,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from names import fault
+
 HERE = Path(__file__).resolve().parent
 KINDS = (("*_dseg.nii.gz", "*_dseg.nii"), ("*_mask.nii.gz", "*_mask.nii"),
          ("*_mesh.ply", "*_mesh.stl", "*_mesh.obj", "*_mesh.off"))
@@ -42,6 +44,9 @@ def describe(output):
 
 
 def participant(dataset, output, labels, options):
+    for label in labels:
+        if fault(label):
+            sys.exit(fault(label))
     folders = [dataset / f"sub-{label}" for label in labels] if labels else sorted(
         path for path in dataset.glob("sub-*") if path.is_dir())
     if not folders:

@@ -44,10 +44,11 @@ typedef struct supine_mesh {
   uint32_t *triangles; /**< [triangle_count, 3] counter-clockwise seen from outside */
 } supine_mesh;
 
-/** How to read a file. If all fields are 0, the axes are taken from it, and the unit is 1 mm. */
+/** How to read a file. If all fields are 0, axes and unit are taken from it. */
 typedef struct supine_mesh_load_options {
   supine_axes axes;
-  double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means 1 */
+  double millimetres_per_unit; /**< length of the unit of coordinates, mm; 0 means the unit that the
+                                  file states (AMF, COLLADA), else 1 */
   const supine_mesh *arrays;   /**< surface to copy instead of reading the file; NULL: none */
 } supine_mesh_load_options;
 
@@ -141,9 +142,9 @@ void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
  * its triangles, weighted by area. It is 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);
 
-/** Compute the unit normal of each vertex as supine_mesh_vertex_normals, then replace each normal ten
- * times by the normalised mean of its own and its neighbours'. A surface that moves along smoothed
- * normals does not fold at its edges.
+/** Compute the unit normal of each vertex as supine_mesh_vertex_normals, then replace each normal
+ * ten times by the normalised mean of its own and its neighbours'. A surface that moves along
+ * smoothed normals does not fold at its edges.
  * @param normals  [vertex_count, 3] output
  * @param space    [vertex_count, 3] work space */
 void supine_mesh_smooth_normals(const supine_mesh *mesh, const supine_topology *topology,

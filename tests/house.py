@@ -7,12 +7,14 @@ Each row of the table names a folder, says what it contains, and lists folders o
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
 each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
 parameters, that the licences name files that exist, that examples
-have a README and a test, that nothing depends on the locale of the host program, that
+have a README and a test, that Python files define the names that they use, that nothing depends on the locale of the host program, that
 distances are printed without digits below rounding, and that tests do not wait for a time."""
+import builtins
 import glob
 import os
 import re
 import subprocess
+import symtable
 import sys
 
 source, build = sys.argv[1:3]
@@ -45,6 +47,11 @@ def read_table():
             else:
                 folders[folder] |= {used} | folders[used]
     return folders
+
+
+def tracked_python():
+    listed = subprocess.run(["git", "-C", source, "ls-files", "*.py"], capture_output=True, text=True, check=False).stdout.split()
+    return [file for file in listed if os.path.exists(os.path.join(source, file))]
 
 
 def tracked():
@@ -322,6 +329,30 @@ def check_waits():
                     faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
 
 
+def check_python_names(files):
+    """Check that each name that a Python file uses is defined in it, or is a built-in."""
+    def used(scope):
+        for symbol in scope.get_symbols():
+            if symbol.is_referenced() and symbol.is_global() or scope.get_type() == "module" and symbol.is_referenced():
+                yield symbol.get_name()
+        for inner in scope.get_children():
+            yield from used(inner)
+
+    def unknown(text, name):
+        table = symtable.symtable(text, name, "exec")
+        own = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned() or symbol.is_imported() or symbol.is_namespace()}
+        own |= set(re.findall(r"^\s*global (\w+)", text, re.M))
+        return sorted(set(used(table)) - own - set(dir(builtins)) - {"__file__", "__path__"})
+
+    if unknown("import os\ndef f(a):\n    return [os.name for b in a if b != c]\n", "") != ["c"]:
+        faults.append("house.py does not find a name that is not defined")
+    for file in files:
+        with open(os.path.join(source, file), encoding="utf-8") as opened:
+            text = opened.read()
+        if not re.search(r"^from \S+ import \*", text, re.M):
+            faults.extend(f"{file}: the name {name} is not defined" for name in unknown(text, file))
+
+
 QUOTED = re.compile(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'')
 CHANGED = r"(?:(?:\+\+|--|&)\s*{0}\b|\b{0}\s*(?:\+\+|--)|\b{0}(?:(?:->|\.)\w+|\[[^]]*\])*\s*(?:[-+*/%&|^]|<<|>>)?=(?!=))"
 # What a condition of SUPINE_REFUSE_IF may call: functions that answer a question about values, without effects.
@@ -480,6 +511,7 @@ check_remedies(files)
 check_includes(folders, files)
 check_system_headers(files)
 check_opening(files)
+check_python_names(tracked_python())
 check_include_cycles(files)
 check_names(folders, files)
 for fault in faults:

@@ -14,6 +14,7 @@ typedef struct image_storage {
   int64_t skip;   /* bytes to skip at the start of the decompressed voxel data */
   bool packed;    /* whether the voxels are compressed by zlib or gzip */
   bool text;      /* whether the voxels are decimal numbers */
+  bool hex;       /* whether the bytes of the voxels are pairs of hexadecimal digits */
   bool big_endian;
   int integer; /* 1 or -1 if the file has signed or unsigned 64-bit integers; otherwise 0 */
   double slope, intercept; /* voxel = slope x number + intercept; not scaled if slope is 0 */

@@ -50,13 +50,6 @@ static const char *value_of(const header *h, const char *key, const char *second
   return value;
 }
 
-/* Return the distances between voxels. Like MetaIO, take the sizes of voxels for them if they are
- * not stated. */
-static const char *spacing_of(const header *h) {
-  const char *spacing = value_of(h, "ElementSpacing", "", "");
-  return *spacing != '\0' ? spacing : value_of(h, "ElementSize", "", "");
-}
-
 static bool is_true(const char *value) {
   return supine_ascii_same(value, "true") || strcmp(value, "1") == 0;
 }
@@ -71,6 +64,32 @@ static bool numbers(const char *text, double *values, size_t count) {
     text = end;
   }
   return good;
+}
+
+/* Find the distances between voxels, in the unit of the file. Like MetaIO, take the sizes of voxels
+ * for them if they are not stated. Return NULL, or a message if neither is stated. */
+static const char *find_spacing(const header *h, size_t count, double *spacing) {
+  const char *text = value_of(h, "ElementSpacing", "", "");
+  text = *text != '\0' ? text : value_of(h, "ElementSize", "", "");
+  if (*text == '\0') {
+    for (size_t i = 0; i < h->count; ++i) {
+      if (supine_ascii_same(h->key[i], "Spacing") ||
+          supine_ascii_same(h->key[i], "ElementSpacing")) {
+        return "its header gives the voxel spacing a name for which other programs take 1 mm: "
+               "name it ElementSpacing";
+      }
+    }
+    return "its header states no voxel spacing: add the line ElementSpacing, in mm";
+  }
+  if (!numbers(text, spacing, count)) {
+    return "a line of its header has too few numbers; save the image again";
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    if (!(spacing[a] > 0.0)) {
+      return "its ElementSpacing is not above 0; save the image again";
+    }
+  }
+  return NULL;
 }
 
 /* Split `text`, which is modified, into keys and values. Return NULL, or a message on failure.
@@ -117,9 +136,28 @@ static const char *check(const header *h) {
   return NULL;
 }
 
+/* Set the steps from the rows of a matrix [n, n]. Without a matrix, which is then 0, the axes of
+ * the image are x, y and z. */
+static void set_steps(supine_image *image, const double *spacing, const double *matrix, size_t n) {
+  bool framed = false;
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t k = 0; k < 3; ++k) {
+      image->step[a][k] = spacing[a] * matrix[a * n + k];
+      framed = framed || matrix[a * n + k] != 0.0;
+    }
+  }
+  if (!framed) {
+    for (size_t a = 0; a < 3; ++a) {
+      image->step[a][a] = spacing[a];
+    }
+  }
+}
+
 /* Find the image's size, position, axes and type; return NULL, or a message on failure. */
 static const char *describe(const header *h, supine_image *image, size_t *type_index) {
   const char *name = value_of(h, "ElementType", "", "");
+  const char *unit = value_of(h, "DistanceUnits", "", "");
+  double millimetres = 1.0; /* of the unit */
   double dimensions = 0.0;
   double channels = 1.0;
   double size[4] = {0.0};
@@ -131,11 +169,18 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
     return "its header does not say NDims = 3; give an image of three axes";
   }
   const size_t n = (size_t)dimensions;
-  if (!numbers(value_of(h, "DimSize", "", ""), size, n) || !numbers(spacing_of(h), spacing, n) ||
+  if (!numbers(value_of(h, "DimSize", "", ""), size, n) ||
       !numbers(value_of(h, "Offset", "Position", "Origin"), offset, n) ||
       !numbers(value_of(h, "TransformMatrix", "Rotation", "Orientation"), matrix, n * n) ||
       !numbers(value_of(h, "ElementNumberOfChannels", "", ""), &channels, 1)) {
     return "a line of its header has too few numbers; save the image again";
+  }
+  const char *unspaced = find_spacing(h, n, spacing);
+  if (unspaced != NULL) {
+    return unspaced;
+  }
+  if (*unit != '\0' && strcmp(unit, "?") != 0 && !supine_mesh_unit_find(unit, &millimetres)) {
+    return "its DistanceUnits are unknown; save the image in mm";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {
     return channels != 1.0 ? "it has several numbers per voxel; save one channel alone"
@@ -148,7 +193,6 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
   if (type == TYPES) {
     return "its ElementType is not supported; save it as MET_SHORT";
   }
-  bool framed = false;
   *type_index = type;
   image->voxel = types[type].voxel;
   image->axes = SUPINE_AXES_LPS;
@@ -158,18 +202,10 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
       return "its DimSize is invalid; save the image again";
     }
     image->size[a] = (size_t)size[a];
-    image->origin[a] = offset[a];
-    for (size_t k = 0; k < 3; ++k) {
-      image->step[a][k] = spacing[a] * matrix[a * n + k];
-      framed = framed || matrix[a * n + k] != 0.0;
-    }
+    image->origin[a] = millimetres * offset[a];
+    spacing[a] *= millimetres;
   }
-  /* if the header has no matrix, the axes of the image are x, y and z */
-  if (!framed) {
-    for (size_t a = 0; a < 3; ++a) {
-      image->step[a][a] = spacing[a];
-    }
-  }
+  set_steps(image, spacing, matrix, n);
   return NULL;
 }
 

@@ -93,43 +93,70 @@ static supine_status check(const char *path, const nifti_image *nifti, bool pack
   return SUPINE_OK;
 }
 
-/* Find where the header says that the voxels begin. Return false if there is no header. */
-static bool find_offset(const char *path, bool *first, double *offset) {
+/* What the header itself states: libnifti2 takes other values for those that are impossible. */
+typedef struct stated {
+  bool first;    /* whether it is NIfTI-1 */
+  double offset; /* where the voxels begin, bytes */
+  double spacing[3];
+  int sform, qform; /* codes */
+} stated;
+
+#define STATED(header)                                                                             \
+  ((stated){.first = sizeof *(header) == sizeof(nifti_1_header),                                   \
+            .offset = (double)(header)->vox_offset,                                                \
+            .spacing = {(double)(header)->pixdim[1], (double)(header)->pixdim[2],                  \
+                        (double)(header)->pixdim[3]},                                              \
+            .sform = (header)->sform_code,                                                         \
+            .qform = (header)->qform_code})
+
+/* Read what the header states. Return false if there is no header. */
+static bool read_stated(const char *path, stated *found) {
   enum { NIFTI_1 = 1 };
   int version = 0;
   int swapped = 0;
-  bool found = false;
+  bool exists = false;
   free(nifti_read_header(path, &version, 1)); /* finds the version, but leaves bytes unswapped */
-  *first = version == NIFTI_1;
-  if (*first) {
+  if (version == NIFTI_1) {
     nifti_1_header *header = nifti_read_n1_hdr(path, &swapped, 1);
-    found = header != NULL;
-    *offset = found ? (double)header->vox_offset : 0.0;
+    exists = header != NULL;
+    if (exists) {
+      *found = STATED(header);
+    }
     free(header);
   } else {
     nifti_2_header *header = nifti_read_n2_hdr(path, &swapped, 1);
-    found = header != NULL;
-    *offset = found ? (double)header->vox_offset : 0.0;
+    exists = header != NULL;
+    if (exists) {
+      *found = STATED(header);
+    }
     free(header);
   }
-  return found;
+  return exists;
 }
 
-/* Refuse a header that does not say where the voxels begin: libnifti2 would take other bytes. */
-static supine_status check_offset(const char *path, supine_error *error) {
-  bool first = true;
-  double offset = 0.0;
-  const bool found = find_offset(path, &first, &offset);
-  const double least = first ? 352.0 : 544.0; /* bytes of the header and the extension flag */
+/* Refuse a header that does not say where the voxels begin or how far apart they are: libnifti2
+ * would take other bytes, or 1 mm. */
+static supine_status check_stated(const char *path, supine_error *error) {
+  stated head = {.first = true};
+  const bool found = read_stated(path, &head);
+  const double least = head.first ? 352.0 : 544.0; /* bytes of the header and the extension flag */
   SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_FORMAT, "%s: not a NIfTI header; give a NIfTI file",
                    path);
   const bool begins =
-      supine_input_judge(SUPINE_INPUT_VOXELS_BEGIN, offset / least) == SUPINE_INPUT_TAKEN &&
-      offset <= (double)INT32_MAX && offset == floor(offset);
+      supine_input_judge(SUPINE_INPUT_VOXELS_BEGIN, head.offset / least) == SUPINE_INPUT_TAKEN &&
+      head.offset <= (double)INT32_MAX && head.offset == floor(head.offset);
   SUPINE_REFUSE_IF(!begins, error, SUPINE_ERROR_FORMAT,
                    "%s: its vox_offset is %g, but voxels begin at a whole byte from %.0f; write "
                    "the image again",
-                   path, offset, least);
+                   path, head.offset, least);
+  for (int a = 0; a < 3; ++a) { /* a qform has no lengths of its own */
+    const bool needed = head.sform <= 0 && head.qform > 0;
+    SUPINE_REFUSE_IF(
+        needed && !(head.spacing[a] > 0.0 && isfinite(head.spacing[a])), error, SUPINE_ERROR_FORMAT,
+        "%s: pixdim[%d], the voxel size, is %g, and the header has no sform: write the image with "
+        "its voxel size, or copy sform from the scan that was segmented",
+        path, a + 1, head.spacing[a]);
+  }
   return SUPINE_OK;
 }
 
@@ -142,7 +169,7 @@ supine_status supine_image_describe_nifti(const char *path, FILE *file, supine_i
   /* the header of a pair of files says so, but nifti_image_read takes its own bytes for voxels */
   SUPINE_REFUSE_IF(is_nifti_file(path) == 2, error, SUPINE_ERROR_FORMAT,
                    "%s: its voxels are in another file; save header and voxels in one .nii", path);
-  SUPINE_TRY(check_offset(path, error));
+  SUPINE_TRY(check_stated(path, error));
   nifti_image *nifti = nifti_image_read(path, 0);
   SUPINE_REFUSE_IF(nifti == NULL, error, SUPINE_ERROR_FORMAT,
                    "%s: not a NIfTI header; give a NIfTI file", path);

@@ -46,6 +46,7 @@ typedef enum field {
   FIELD_SIZES,
   FIELD_DIRECTIONS,
   FIELD_ORIGIN,
+  FIELD_UNITS,
   FIELD_ENCODING,
   FIELD_ENDIAN,
   FIELD_LINE_SKIP,
@@ -73,7 +74,7 @@ static const struct {
               {"data file", FIELD_DATA_FILE},
               {"datafile", FIELD_DATA_FILE},
               {"space dimension", FIELD_UNUSED},
-              {"space units", FIELD_UNUSED},
+              {"space units", FIELD_UNITS},
               {"measurement frame", FIELD_UNUSED},
               {"content", FIELD_UNUSED},
               {"number", FIELD_UNUSED},
@@ -99,10 +100,12 @@ static const struct {
               {"sample units", FIELD_UNUSED},
               {"sampleunits", FIELD_UNUSED}};
 
-/* Values of the fields, "" where the header lacks a field. */
+/* Values of the fields, `absent` where the header lacks a field. */
 typedef struct header {
   const char *value[FIELDS];
 } header;
+
+static const char absent[] = "";
 
 /* Remove blanks from both ends of a text. */
 static char *trim(char *text) {
@@ -115,41 +118,49 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Store the value of a line "field: value", which may not set a field again. Skip "key:=value",
- * which may hold anything. Return whether the line is one of both. */
-static bool take_line(char *line, header *h, supine_arena *arena) {
-  const char *key = strstr(line, ":=");
+/* Find the colon that ends the name of a field: one that a blank or the line's end follows. */
+static char *find_colon(char *line) {
   char *colon = strchr(line, ':');
   while (colon != NULL && strchr(" \t", colon[1]) == NULL) { /* also finds the NUL after ':' */
     colon = strchr(colon + 1, ':');
   }
-  if (key != NULL && (colon == NULL || key < colon)) {
-    return true;
-  }
-  if (colon == NULL) {
-    return false;
-  }
-  *colon = '\0';
-  const char *name = trim(line);
-  const char *value = trim(colon + 1);
+  return colon;
+}
+
+/* Find a field by its name; FIELDS if there is none. */
+static field find_field(const char *name) {
   size_t f = 0;
   while (f < sizeof fields / sizeof *fields && !supine_ascii_same(name, fields[f].name)) {
     ++f;
   }
-  if (f == sizeof fields / sizeof *fields) {
-    return false;
+  return f < sizeof fields / sizeof *fields ? fields[f].field : FIELDS;
+}
+
+/* Store the value of a line "field: value", which may not set a field again. Skip "key:=value",
+ * whose key and value may hold anything. Return whether the line is one of both. */
+static bool take_line(char *line, header *h, supine_arena *arena) {
+  const bool keyed = strstr(line, ":=") != NULL;
+  char *colon = find_colon(line);
+  if (colon == NULL) {
+    return keyed;
   }
-  if (fields[f].field == FIELD_UNUSED) {
+  *colon = '\0';
+  const char *value = trim(colon + 1);
+  const field found = find_field(trim(line));
+  if (found == FIELDS) {
+    return keyed;
+  }
+  if (found == FIELD_UNUSED) {
     return true;
   }
-  if (*h->value[fields[f].field] != '\0') {
+  if (h->value[found] != absent) {
     return false;
   }
   const size_t size = strlen(value) + 1;
   char *copy = supine_arena_take(arena, size, 1);
   if (copy != NULL) {
     memcpy(copy, value, size);
-    h->value[fields[f].field] = copy;
+    h->value[found] = copy;
   }
   return true;
 }
@@ -158,14 +169,14 @@ static void free_line(char **line) {
   free(*line);
 }
 
-/* Read the lines up to the empty one, after which the voxels begin. */
+/* Read the lines up to the empty one, which may hold blanks, after which the voxels begin. */
 static supine_status read_header(const char *path, FILE *file, header *h, supine_arena *arena,
                                  supine_error *error) {
   char magic[16] = "";
   SUPINE_FREED_BY(free_line) char *line = NULL;
   size_t room = 0;
   for (int i = 0; i < FIELDS; ++i) {
-    h->value[i] = "";
+    h->value[i] = absent;
   }
   const bool begun = fgets(magic, sizeof magic, file) != NULL;
   magic[strcspn(magic, "\r\n")] = '\0';
@@ -181,15 +192,16 @@ static supine_status read_header(const char *path, FILE *file, header *h, supine
                      "%s: no empty line ends its header; write the image again", path);
     const bool text = strlen(line) == (size_t)length;
     line[strcspn(line, "\r\n")] = '\0';
-    if (text && *line == '\0') {
+    char *begin = line + strspn(line, " \t");
+    if (text && *begin == '\0') {
       return supine_arena_check(arena, error, "the header of %s", path);
     }
-    const bool known = text && (*line == '#' || take_line(line, h, arena));
+    const bool known = text && (*begin == '#' || take_line(line, h, arena));
     SUPINE_REFUSE_IF(
         !known, error, SUPINE_ERROR_FORMAT,
         "%s: line %zu is not a field of an NRRD header, or sets one again; write the image again",
         path, number);
-    SUPINE_REFUSE_IF(*h->value[FIELD_DATA_FILE] != '\0', error, SUPINE_ERROR_FORMAT,
+    SUPINE_REFUSE_IF(h->value[FIELD_DATA_FILE] != absent, error, SUPINE_ERROR_FORMAT,
                      "%s: its voxels are in another file; save all in one file", path);
   }
 }
@@ -240,21 +252,79 @@ static bool is_one_of(const char *value, const char *const *words, size_t count)
   return is;
 }
 
-/* Find sizes, position and axes. */
+/* Read the vectors of the axes, and the sizes. An axis without a direction, "none", is that of the
+ * layers of a segmentation: it must have one, and is removed. Return NULL, or a message on failure.
+ */
+static const char *read_axes(const header *h, size_t dimension, supine_image *image) {
+  enum { MOST = 4 };
+  const char *directions = h->value[FIELD_DIRECTIONS];
+  const char *none = strstr(directions, "none");
+  char text[512];
+  size_t size[MOST] = {0};
+  if (!read_counts(h->value[FIELD_SIZES], dimension, size)) {
+    return "its sizes are not whole numbers, one for each axis; write the image again";
+  }
+  size_t layer = dimension; /* index of the axis without a direction */
+  (void)snprintf(text, sizeof text, "%s", directions);
+  if (none != NULL && dimension == MOST && strlen(directions) < sizeof text) {
+    layer = 0;
+    for (const char *at = directions; at < none; ++at) {
+      layer += *at == ')' ? 1 : 0;
+    }
+    memset(text + (none - directions), ' ', 4);
+  }
+  if (dimension == MOST && (layer == dimension || size[layer] != 1)) {
+    return "its dimension is 4, and it does not have one layer; give an image with one number per "
+           "voxel and three axes, or export one layer of the segmentation";
+  }
+  for (size_t a = 0, k = 0; a < dimension; ++a) {
+    if (a != layer) {
+      image->size[k++] = size[a];
+    }
+  }
+  const bool placed =
+      read_vectors(text + strspn(text, " \t"), 3, image->step) &&
+      (h->value[FIELD_ORIGIN] == absent || read_vectors(h->value[FIELD_ORIGIN], 1, &image->origin));
+  return placed ? NULL
+                : "its space directions and space origin are not vectors of three numbers; write "
+                  "the image again";
+}
+
+/* Find the unit of positions: the first in quotes, which all must have. An empty one is mm. */
+static bool read_unit(const char *units, double *millimetres) {
+  char first[16] = "";
+  *millimetres = 1.0;
+  for (const char *at = strchr(units, '"'); at != NULL; at = strchr(at, '"')) {
+    char unit[16];
+    const size_t length = strcspn(at + 1, "\"");
+    (void)snprintf(unit, sizeof unit, "%.*s", (int)(length < 15 ? length : 15), at + 1);
+    if (*first == '\0') {
+      memcpy(first, unit, sizeof first);
+    }
+    if (strcmp(first, unit) != 0) {
+      return false;
+    }
+    at += 1 + length;
+    at += *at != '\0' ? 1 : 0;
+  }
+  return *first == '\0' || supine_mesh_unit_find(first, millimetres);
+}
+
+/* Find sizes, position and axes. Without an origin, the first voxel is at 0, as in teem. */
 static supine_status find_frame(const char *path, const header *h, supine_image *image,
                                 supine_error *error) {
   static const char *const lps_names[] = {"left-posterior-superior", "LPS"};
   static const char *const ras_names[] = {"right-anterior-superior", "RAS"};
   size_t dimension = 0;
+  double unit = 1.0;
   const char *space = h->value[FIELD_SPACE];
-  const char *directions = h->value[FIELD_DIRECTIONS];
   const bool stated = read_counts(h->value[FIELD_DIMENSION], 1, &dimension);
   SUPINE_REFUSE_IF(!stated, error, SUPINE_ERROR_FORMAT,
                    "%s: its header states no dimension; write the image again", path);
-  SUPINE_REFUSE_IF(dimension != 3, error, SUPINE_ERROR_FORMAT,
+  SUPINE_REFUSE_IF(dimension != 3 && dimension != 4, error, SUPINE_ERROR_FORMAT,
                    "%s: dimension %zu; give an image with one number per voxel and three axes",
                    path, dimension);
-  SUPINE_REFUSE_IF(*directions == '\0', error, SUPINE_ERROR_FORMAT,
+  SUPINE_REFUSE_IF(h->value[FIELD_DIRECTIONS] == absent, error, SUPINE_ERROR_FORMAT,
                    "%s: the header lacks space directions for its 3 axes; add them", path);
   const bool lps = is_one_of(space, lps_names, 2);
   const bool ras = is_one_of(space, ras_names, 2);
@@ -262,23 +332,18 @@ static supine_status find_frame(const char *path, const header *h, supine_image 
                    "%s: its space is neither left-posterior-superior nor right-anterior-superior; "
                    "convert the image to one of them",
                    path);
-  const bool sized = read_counts(h->value[FIELD_SIZES], 3, image->size);
-  const bool placed = read_vectors(directions, 3, image->step) &&
-                      read_vectors(h->value[FIELD_ORIGIN], 1, &image->origin);
-  SUPINE_REFUSE_IF(!sized, error, SUPINE_ERROR_FORMAT,
-                   "%s: its sizes are not three whole numbers; write the image again", path);
-  SUPINE_REFUSE_IF(!placed, error, SUPINE_ERROR_FORMAT,
-                   "%s: its space directions and space origin are not four vectors of three "
-                   "numbers; write the image again",
-                   path);
+  const char *wrong = read_axes(h, dimension, image);
+  SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
+  const bool measured = read_unit(h->value[FIELD_UNITS], &unit);
+  SUPINE_REFUSE_IF(!measured, error, SUPINE_ERROR_FORMAT,
+                   "%s: its space units are unknown or differ; write the image in mm", path);
   image->axes = lps ? SUPINE_AXES_LPS : SUPINE_AXES_RAS;
   image->frame_source = "space directions";
-  if (ras) {
-    for (int k = 0; k < 2; ++k) {
-      image->origin[k] = -image->origin[k];
-      for (int a = 0; a < 3; ++a) {
-        image->step[a][k] = -image->step[a][k];
-      }
+  for (int k = 0; k < 3; ++k) {
+    const double turn = ras && k < 2 ? -unit : unit;
+    image->origin[k] *= turn;
+    for (int a = 0; a < 3; ++a) {
+      image->step[a][k] *= turn;
     }
   }
   return SUPINE_OK;
@@ -289,6 +354,7 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
                                   image_storage *storage, supine_error *error) {
   static const char *const gzip[] = {"gzip", "gz"};
   static const char *const text[] = {"ascii", "text", "txt"};
+  static const char *const hex[] = {"hex"};
   const char *encoding = h->value[FIELD_ENCODING];
   const char *endian = h->value[FIELD_ENDIAN];
   const char *lines = h->value[FIELD_LINE_SKIP];
@@ -297,11 +363,13 @@ static supine_status find_storage(const char *path, const header *h, supine_imag
       (*lines != '\0' && strcmp(lines, "0") != 0) || (*bytes != '\0' && strcmp(bytes, "0") != 0);
   storage->packed = is_one_of(encoding, gzip, 2);
   storage->text = is_one_of(encoding, text, 3);
+  storage->hex = is_one_of(encoding, hex, 1);
   storage->big_endian = supine_ascii_same(endian, "big");
   const bool raw = supine_ascii_same(encoding, "raw");
   SUPINE_REFUSE_IF(
-      (!raw && !storage->packed && !storage->text) || skips, error, SUPINE_ERROR_FORMAT,
-      "%s: its encoding is not raw, gzip or ascii, or its header skips lines or bytes; "
+      (!raw && !storage->packed && !storage->text && !storage->hex) || skips, error,
+      SUPINE_ERROR_FORMAT,
+      "%s: its encoding is not raw, gzip, ascii or hex, or its header skips lines or bytes; "
       "save the image again as gzip",
       path);
   size_t type = 0;

@@ -49,8 +49,10 @@ static bool unpack_whole(FILE *file, size_t packed_size, size_t skip, unsigned c
   return good;
 }
 
-/* Unpack a stream, checking its checksums: drop `skip` bytes, store `size` bytes in `values`. */
-static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size) {
+/* Unpack a stream, checking its checksums: drop `skip` bytes, store `size` bytes in `values`, and
+ * count the bytes after them. */
+static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_t size,
+                         uint64_t *after) {
   unsigned char packed[PIECE];
   unsigned char discarded[PIECE];
   z_stream z = {.avail_in = 0};
@@ -79,6 +81,7 @@ static bool inflate_into(FILE *file, uint64_t skip, unsigned char *values, size_
     }
   }
   (void)inflateEnd(&z);
+  *after = unpacked > end ? unpacked - end : 0;
   return result == Z_STREAM_END;
 }
 
@@ -160,18 +163,60 @@ static bool read_text(FILE *file, supine_image *image, size_t count) {
   return true;
 }
 
-/* Read the numbers as the file stores them; return false if it is damaged. */
+/* Return the value of a hexadecimal digit, or 16 for any other character. */
+static unsigned digit_of(int c) {
+  static const char digits[] = "0123456789abcdef";
+  const char *at = c > 0 && c < 128 ? strchr(digits, c < 'a' && c > '9' ? c + 32 : c) : NULL;
+  return at != NULL ? (unsigned)(at - digits) : 16;
+}
+
+/* Read `size` bytes as pairs of hexadecimal digits; blanks between them are skipped. */
+static bool read_hex(FILE *file, unsigned char *bytes, size_t size) {
+  for (size_t i = 0; i < 2 * size; ++i) {
+    int c = getc(file);
+    while (c != EOF && supine_ascii_is_space((char)c)) {
+      c = getc(file);
+    }
+    const unsigned digit = digit_of(c);
+    if (digit == 16) {
+      return false;
+    }
+    bytes[i / 2] = (unsigned char)(i % 2 == 0 ? digit << 4 : bytes[i / 2] | digit);
+  }
+  return true;
+}
+
+/* Count the bytes left in a file: all, or those that are no blanks. Stop at `most`. */
+static size_t count_left(FILE *file, bool text, size_t most) {
+  size_t left = 0;
+  for (int c = getc(file); c != EOF && left < most; c = getc(file)) {
+    left += text && supine_ascii_is_space((char)c) ? 0 : 1;
+  }
+  return left;
+}
+
+/* Read the numbers as the file stores them; return false if it is damaged.
+ * @param more  whether as many bytes follow as a plane has, so that they are no padding */
 static bool read_numbers(FILE *file, size_t file_size, const image_storage *storage,
-                         supine_image *image, size_t count) {
+                         supine_image *image, bool *more) {
   const size_t each = supine_image_voxel_size(image->voxel);
+  const size_t plane = image->size[0] * image->size[1];
+  const size_t count = plane * image->size[2];
+  *more = false;
   if (fseeko(file, storage->offset, SEEK_SET) != 0) {
     return false;
   }
-  if (storage->text && !storage->packed) {
-    return read_text(file, image, count);
-  }
   if (!storage->packed) {
-    return fread(image->values, each, count, file) == count;
+    bool good = false;
+    if (storage->text) {
+      good = read_text(file, image, count);
+    } else if (storage->hex) {
+      good = read_hex(file, image->values, each * count);
+    } else {
+      good = fread(image->values, each, count, file) == count;
+    }
+    *more = count_left(file, storage->text || storage->hex, each * plane) == each * plane;
+    return good;
   }
   const uint64_t before = (uint64_t)storage->offset;
   const uint64_t skip = (uint64_t)storage->skip;
@@ -180,8 +225,11 @@ static bool read_numbers(FILE *file, size_t file_size, const image_storage *stor
       unpack_whole(file, file_size - (size_t)before, (size_t)skip, image->values, count * each)) {
     return true;
   }
-  return fseeko(file, storage->offset, SEEK_SET) == 0 &&
-         inflate_into(file, skip, image->values, count * each);
+  uint64_t after = 0;
+  const bool good = fseeko(file, storage->offset, SEEK_SET) == 0 &&
+                    inflate_into(file, skip, image->values, count * each, &after);
+  *more = after >= each * plane;
+  return good;
 }
 
 supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file_size,
@@ -201,9 +249,15 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
   if (image->values == NULL) {
     return supine_error_memory(error, "%zu voxels of %s", count, path);
   }
-  const bool good = read_numbers(file, file_size, storage, image, count);
+  bool more = false;
+  const bool good = read_numbers(file, file_size, storage, image, &more);
   SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
                    "%s: truncated or damaged; fetch or write the file again", path);
+  SUPINE_REFUSE_IF(
+      more, error, SUPINE_ERROR_FORMAT,
+      "%s: it holds more voxels than the %zu x %zu x %zu that its header counts: write "
+      "the image again",
+      path, image->size[0], image->size[1], image->size[2]);
   if (storage->big_endian && !storage->text) {
     swap_bytes(image->values, count, each);
   }

@@ -388,27 +388,53 @@ supine_status supine_io_import(mesh_file *file, supine_mesh *mesh, size_t *dropp
   return status;
 }
 
-/* Make the text of an OBJ file one that assimp reads: blank the byte order mark, and join lines
- * that a backslash continues. */
-static void tidy_obj(mesh_file *file) {
-  unsigned char *at = file->bytes;
-  if (file->size >= 3 && at[0] == 0xEF && at[1] == 0xBB && at[2] == 0xBF) {
-    memset(at, '\n', 3);
+/* Return whether a comment may follow the words of a line of an OBJ file that begins with `word`.
+ * Other words, such as o and usemtl, are followed by names, which may hold the sign. */
+static bool may_have_comment(mesh_text word) {
+  static const char *const words[] = {"v", "vt", "vn", "vp", "f", "l", "p", "s"};
+  bool may = word.at < word.end && *word.at == '#';
+  for (size_t i = 0; i < sizeof words / sizeof *words; ++i) {
+    may = may || supine_io_text_is(word, words[i]);
   }
-  for (size_t i = 0; i + 1 < file->size; ++i) {
-    const size_t skip = at[i + 1] == '\r' && i + 2 < file->size ? 2 : 1;
-    if (at[i] == '\\' && at[i + skip] == '\n') {
-      memset(at + i, ' ', skip + 1);
+  return may;
+}
+
+/* Make the text of an OBJ file one that assimp reads: blank the byte order mark and comments, and
+ * join lines that a backslash continues. A comment ends with its line, whatever its last character.
+ */
+static void tidy_obj(mesh_file *file) {
+  unsigned char *bytes = file->bytes;
+  if (file->size >= 3 && bytes[0] == 0xEF && bytes[1] == 0xBB && bytes[2] == 0xBF) {
+    memset(bytes, '\n', 3);
+  }
+  mesh_text text = {bytes, bytes + file->size};
+  mesh_text line;
+  bool continued = false;
+  bool commented = false; /* whether the line's first word may be followed by a comment */
+  while (supine_io_text_line(&text, &line)) {
+    mesh_text rest = line;
+    mesh_text word;
+    if (!continued) {
+      commented = supine_io_text_word(&rest, &word) && may_have_comment(word);
+    }
+    const size_t length = (size_t)(line.end - line.at);
+    const unsigned char *mark = commented && length > 0 ? memchr(line.at, '#', length) : NULL;
+    continued = mark == NULL && length > 0 && line.end[-1] == '\\' && text.at > line.end;
+    if (mark != NULL) {
+      memset(bytes + (mark - bytes), ' ', (size_t)(line.end - mark));
+    } else if (continued) {
+      memset(bytes + (line.end - 1 - bytes), ' ', (size_t)(text.at - line.end) + 1);
     }
   }
 }
 
 /* Make a binary STL file one that assimp reads: drop bytes after the last triangle, and count the
- * triangles if the file says that there are none. Other wrong counts are left as they are. */
-static void tidy_binary_stl(mesh_file *file) {
+ * triangles if the file says that there are none. Refuse a count that leaves whole triangles out.
+ */
+static supine_status tidy_binary_stl(mesh_file *file, supine_error *error) {
   enum { HEADER = 84, COUNT = 80, TRIANGLE = 50 };
   if (file->size < HEADER) {
-    return;
+    return SUPINE_OK;
   }
   const size_t room = (file->size - HEADER) / TRIANGLE;
   uint64_t count = 0;
@@ -419,19 +445,40 @@ static void tidy_binary_stl(mesh_file *file) {
     for (size_t k = 0; k < 4; ++k) {
       file->bytes[COUNT + k] = (unsigned char)(room >> 8 * k);
     }
-  } else if (count > 0 && count <= room) {
+    return SUPINE_OK;
+  }
+  SUPINE_REFUSE_IF(count < room, error, SUPINE_ERROR_FORMAT,
+                   "%s: its header counts %zu triangle%s, but it has room for %zu: save it again, "
+                   "so that no part of the surface is lost",
+                   file->path, (size_t)count, count == 1 ? "" : "s", room);
+  if (count > 0 && count == room) {
     file->size = HEADER + TRIANGLE * (size_t)count;
   }
+  return SUPINE_OK;
 }
 
 static unsigned char lower(char c) {
   return (unsigned char)(supine_ascii_is_letter(c) ? c | 0x20 : c);
 }
 
-/* Write the words of an STL text in small letters, as assimp knows only these. */
+/* Write the words of an STL text in small letters, as assimp knows only these. Write 0 for the
+ * normals of facets, which nobody uses: those of a facet without area are no numbers. */
 static void tidy_text_stl(mesh_file *file) {
+  static const char normal[] = "facet normal 0 0 0";
   for (size_t i = 0; i < file->size; ++i) {
     file->bytes[i] = lower((char)file->bytes[i]);
+  }
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text line;
+  while (supine_io_text_line(&text, &line)) {
+    mesh_text rest = line;
+    mesh_text word;
+    const bool facet = supine_io_text_word(&rest, &word) && supine_io_text_is(word, "facet");
+    unsigned char *at = file->bytes + (word.at - file->bytes);
+    if (facet && (size_t)(line.end - at) >= sizeof normal - 1) {
+      memset(at, ' ', (size_t)(line.end - at));
+      memcpy(at, normal, sizeof normal - 1);
+    }
   }
 }
 
@@ -477,7 +524,7 @@ supine_status supine_io_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dro
                      file->path);
     tidy_text_stl(file);
   } else {
-    tidy_binary_stl(file);
+    SUPINE_TRY(tidy_binary_stl(file, error));
   }
   return supine_io_import(file, mesh, dropped, error);
 }

@@ -9,6 +9,7 @@
 #include "base/arena.h"
 #include "base/ascii.h"
 #include "base/input.h"
+#include "base/number.h"
 #include "base/text.h"
 
 #include "mesh/io/read.h"
@@ -55,6 +56,56 @@ static void find_space(mesh_file *file) {
   }
 }
 
+/* Copy the value of an attribute of the first element `tag` in the first 4095 bytes of a file; ""
+ * if it has none. */
+static void find_attribute(const mesh_file *file, const char *tag, const char *name,
+                           char value[32]) {
+  char head[4096];
+  char wanted[32];
+  (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
+  (void)snprintf(wanted, sizeof wanted, " %s=", name);
+  char *element = strstr(head, tag);
+  char *end = element != NULL ? strchr(element, '>') : NULL;
+  value[0] = '\0';
+  if (end != NULL) {
+    *end = '\0';
+    const char *at = strstr(element, wanted);
+    at = at != NULL ? at + strlen(wanted) : "";
+    if (*at == '"' || *at == '\'') {
+      (void)snprintf(value, 32, "%.*s", (int)strnlen(at + 1, 31), at + 1);
+      value[strcspn(value, "\"'")] = '\0';
+    }
+  }
+}
+
+/* Find the unit that the file states: AMF names it, and assimp converts COLLADA to metres where it
+ * states another unit. Without one, `millimetres` stays 0. */
+static supine_status find_unit(mesh_file *file, supine_error *error) {
+  static const struct {
+    const char *name;
+    double millimetres;
+  } names[] = {
+      {"millimeter", 1.0}, {"inch", 25.4}, {"feet", 304.8}, {"meter", 1000.0}, {"micron", 1e-3}};
+  char text[32];
+  char *end = NULL;
+  if (supine_text_ends_in(file->path, ".dae")) {
+    find_attribute(file, "<unit", "meter", text);
+    const double metres = supine_number_parse(text, &end);
+    file->millimetres = end != text && metres > 0.0 && metres != 1.0 ? 1000.0 : 0.0;
+  } else if (supine_text_ends_in(file->path, ".amf")) {
+    find_attribute(file, "<amf", "unit", text);
+    for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
+      if (supine_ascii_same(text, names[i].name)) {
+        file->millimetres = names[i].millimetres;
+      }
+    }
+    SUPINE_REFUSE_IF(text[0] != '\0' && file->millimetres == 0.0, error, SUPINE_ERROR_FORMAT,
+                     "%s: the unit \"%s\" is unknown; save the mesh in millimeter", file->path,
+                     text);
+  }
+  return SUPINE_OK;
+}
+
 static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader **reader,
                                supine_error *error) {
   size_t size = 0;
@@ -70,6 +121,7 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
   SUPINE_REFUSE_IF(ferror(stream) != 0, error, SUPINE_ERROR_READ, "%s: cannot read: %s", file->path,
                    strerror(errno == 0 ? EIO : errno));
   find_space(file);
+  SUPINE_TRY(find_unit(file, error));
   *reader = find_reader(file->path);
   SUPINE_REFUSE_IF(*reader == NULL && supine_text_ends_in(file->path, ".vtk"), error,
                    SUPINE_ERROR_FORMAT,
@@ -152,7 +204,7 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error) {
   const supine_mesh_load_options chosen =
       options == NULL ? (supine_mesh_load_options){0} : *options;
-  const double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
+  double scale = chosen.millimetres_per_unit == 0.0 ? 1.0 : chosen.millimetres_per_unit;
   SUPINE_REFUSE_IF(!(scale > 0.0) || !isfinite(scale), error, SUPINE_ERROR_ARGUMENT,
                    "%s: %g mm per unit is not a positive number", path, scale);
   SUPINE_ARENA arena = {0};
@@ -165,6 +217,9 @@ supine_status supine_mesh_load(const char *path, const supine_mesh_load_options 
   } else {
     SUPINE_TRY(read_file(&file, &arena, &reader, error));
     SUPINE_TRY(reader(&file, &loaded, &found.degenerate_faces, error));
+  }
+  if (chosen.millimetres_per_unit == 0.0 && file.millimetres > 0.0) {
+    scale = file.millimetres;
   }
   SUPINE_TRY(choose_axes(&file, chosen.axes, &found, error));
   SUPINE_TRY(convert(path, scale, found.axes, &loaded, error));

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "base/arena.h"
+#include "base/ascii.h"
 
 #include "mesh/io/read.h"
 
@@ -268,6 +269,21 @@ static supine_status make_room(const ply *in, const element *of, supine_mesh *me
              : SUPINE_OK;
 }
 
+/* Refuse a file with more than the header counts: a part of the surface would be lost. Blanks, and
+ * zeros, are padding. */
+static supine_status check_end(const ply *in) {
+  const unsigned char *at = in->text.at;
+  while (at < in->text.end && (*at == '\0' || supine_ascii_is_space((char)*at))) {
+    ++at;
+  }
+  SUPINE_REFUSE_IF(
+      at < in->text.end, in->error, SUPINE_ERROR_FORMAT,
+      "%s: %zu bytes follow what the PLY header counts: save the mesh again, so that no "
+      "part of the surface is lost",
+      in->file->path, (size_t)(in->text.end - at));
+  return SUPINE_OK;
+}
+
 supine_status supine_io_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                  supine_error *error) {
   ply in = {.file = file,
@@ -285,6 +301,7 @@ supine_status supine_io_read_ply(mesh_file *file, supine_mesh *mesh, size_t *dro
     }
     SUPINE_TRY(take_items(&in, of));
   }
+  SUPINE_TRY(check_end(&in));
   *dropped = in.faces.dropped;
   return SUPINE_OK;
 }

@@ -85,6 +85,11 @@ static supine_status read_rows(reading *r, supine_csv *csv, const size_t column[
     }
     const char *name = supine_csv_text(csv, NAME);
     name = name != NULL && name[0] != '\0' ? name : supine_csv_text(csv, LABEL);
+    /* the table converts to mm what names its unit; an option's unit replaces that */
+    const bool given = r->options != NULL && r->options->millimetres_per_unit > 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+      at[k] /= given ? supine_csv_scale(csv, column[k]) : 1.0;
+    }
     SUPINE_TRY(add(r, at, name, axes, 1.0));
   }
 }
@@ -167,13 +172,23 @@ static supine_status read_fcsv(reading *r) {
   return read_rows(r, &csv, xyz, axes);
 }
 
+/* Find the unit of a markup's coordinates: a text, or a coded entry, whose first member is the code
+ * of the unit. Without one it is mm. Return false for any other value. */
+static bool find_markup_unit(const json_t *markup, const char **name, double *millimetres) {
+  const json_t *stated = json_object_get(markup, "coordinateUnits");
+  const json_t *code = json_is_array(stated) ? json_array_get(stated, 0) : stated;
+  *name = json_is_string(code) ? json_string_value(code) : "";
+  *millimetres = 1.0;
+  return stated == NULL || supine_mesh_unit_find(*name, millimetres);
+}
+
 static supine_status read_markup(reading *r, const json_t *markup) {
   const char *system = json_string_value(json_object_get(markup, "coordinateSystem"));
-  const char *unit = json_string_value(json_object_get(markup, "coordinateUnits"));
   supine_axes axes = SUPINE_AXES_LPS;
+  const char *unit = NULL;
   double scale = 1.0;
   const bool known = system == NULL || find_system(system, &axes);
-  const bool measured = unit == NULL || supine_mesh_unit_find(unit, &scale);
+  const bool measured = find_markup_unit(markup, &unit, &scale);
   SUPINE_REFUSE_IF(!known, r->error, SUPINE_ERROR_FORMAT,
                    "%s: the coordinate system \"%s\" is neither LPS nor RAS: save the points in "
                    "one of these",

@@ -51,7 +51,8 @@ typedef struct mesh_file {
   size_t size;
   bool tagged; /**< whether the file names its axes in a SPACE tag, as 3D Slicer writes it */
   bool turned; /**< output of a reader: whether it turned the axes, as the file's up axis says */
-  supine_axes space; /**< axes named by the SPACE tag; AUTO if there is none or it is unknown */
+  double millimetres; /**< length of the unit that the file states, mm; 0 if it states none */
+  supine_axes space;  /**< axes named by the SPACE tag; AUTO if there is none or it is unknown */
 } mesh_file;
 
 /** Refuse a text with a NUL byte, or with a CR that no LF follows: other readers would split its

@@ -2,6 +2,7 @@
 /* Read pairs of points, check that they can be two states of one chest, and fit maps to them. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include <gsl/gsl_statistics.h>
 #include <lapacke.h>
@@ -96,6 +97,43 @@ void supine_patient_pairs_free(supine_patient_pairs *pairs) {
   free(pairs->to);
   free(pairs->side);
   *pairs = (supine_patient_pairs){0};
+}
+
+supine_status supine_patient_pairs_thin(supine_patient_pairs *pairs, size_t most,
+                                        supine_error *error) {
+  const size_t n = pairs->count;
+  if (n <= most) {
+    return SUPINE_OK;
+  }
+  SUPINE_ARENA arena = {0};
+  double *apart = supine_arena_take(&arena, n, sizeof *apart); /* from the chosen; -1: chosen */
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu pairs of points", n));
+  for (size_t i = 0; i < n; ++i) {
+    apart[i] = INFINITY;
+  }
+  size_t next = 0;
+  for (size_t chosen = 0; chosen < most; ++chosen) {
+    const size_t last = next;
+    apart[last] = -1.0;
+    next = 0;
+    for (size_t i = 0; i < n; ++i) {
+      apart[i] = fmin(apart[i], supine_distance(pairs->from + 3 * i, pairs->from + 3 * last));
+      next = apart[i] > apart[next] ? i : next;
+    }
+  }
+  size_t kept = 0;
+  for (size_t i = 0; i < n; ++i) {
+    if (apart[i] < 0.0) {
+      memmove(pairs->from + 3 * kept, pairs->from + 3 * i, 3 * sizeof *pairs->from);
+      memmove(pairs->to + 3 * kept, pairs->to + 3 * i, 3 * sizeof *pairs->to);
+      if (pairs->side != NULL) {
+        pairs->side[kept] = pairs->side[i];
+      }
+      ++kept;
+    }
+  }
+  pairs->count = kept;
+  return SUPINE_OK;
 }
 
 void supine_patient_map_apply(const supine_patient_affinity *map, const double from[3],

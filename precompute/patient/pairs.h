@@ -26,6 +26,13 @@ supine_status supine_patient_pairs_load(const char *path, bool reverse, supine_p
                                         supine_error *error);
 void supine_patient_pairs_free(supine_patient_pairs *pairs);
 
+/** Keep at most `most` pairs, spread evenly over the lungs, in their order: each next one is the
+ * pair whose first point lies farthest from those of the pairs already chosen. Cost: `most`
+ * distances for each pair.
+ * @return SUPINE_ERROR_MEMORY or SUPINE_OK */
+supine_status supine_patient_pairs_thin(supine_patient_pairs *pairs, size_t most,
+                                        supine_error *error);
+
 /** Estimate the volume of the second state divided by that of the first: the determinant of the
  * best-fitting affine map.
  * @return 1 if the points do not determine a map, or if the map is a reflection */

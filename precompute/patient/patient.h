@@ -50,8 +50,9 @@ typedef struct supine_patient_frame {
 
 enum {
   SUPINE_PATIENT_CONSTANTS = 9,
-  SUPINE_PATIENT_COLUMNS = 4, /**< the force is a linear function with 4 terms: 1, X, Y, Z */
-  SUPINE_PATIENT_CENTRES_MAX = 900
+  SUPINE_PATIENT_COLUMNS = 4,       /**< the force is a linear function with 4 terms: 1, X, Y, Z */
+  SUPINE_PATIENT_CENTRES_MAX = 900, /**< most points of a fit, and centres of its kriging */
+  SUPINE_PATIENT_VERTICES_MAX = 600 /**< most of them that are matched vertices of surfaces */
 };
 
 /** Constants of a displacement law, and the rigid motion of the body between the two scans. */

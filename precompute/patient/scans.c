@@ -153,6 +153,20 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
          sizeof record->emptier[1]);
 }
 
+/* Thin landmarks to the number that a fit takes, and say so. A registration gives thousands. */
+static supine_status thin(supine_patient_scans *scans, bool from_surface, supine_error *error) {
+  const size_t most = SUPINE_PATIENT_CENTRES_MAX - (from_surface ? SUPINE_PATIENT_VERTICES_MAX : 0);
+  const size_t given = scans->pairs.count;
+  if (given > most) {
+    SUPINE_TRY(supine_patient_pairs_thin(&scans->pairs, most, error));
+    supine_findings_note(&scans->findings,
+                         "of %zu pairs of landmarks, the %zu that are spread most evenly over "
+                         "the lungs are fitted",
+                         given, most);
+  }
+  return SUPINE_OK;
+}
+
 static void exchange(supine_patient_scans *scans, supine_state state[2]) {
   const supine_lungs lungs = scans->lungs[0];
   const supine_state first = state[0];
@@ -190,6 +204,7 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   if (record->from_surface && scans->pairs.count > 0) {
     SUPINE_TRY(supine_patient_check_order(&scans->pairs, growth, error));
   }
+  SUPINE_TRY(thin(scans, record->from_surface, error));
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
   }

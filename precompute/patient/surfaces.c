@@ -11,8 +11,7 @@
 #include "base/text.h"
 
 enum {
-  VERTICES_MAX = 600,  /* largest number of matched vertices */
-  REGIONAL_MAX = 4000, /* the same, if the stiffness of lung regions is fitted */
+  REGIONAL_MAX = 4000, /* most matched vertices, if the stiffness of lung regions is fitted */
   ROUNDS_MAX = 60
 };
 
@@ -146,7 +145,8 @@ supine_status supine_patient_fit_surface(const supine_lungs *fuller, const supin
   record->stiffness.count = 0;
   SUPINE_TRY(supine_patient_check_boxes(&fuller->mesh, emptier, error));
   SUPINE_TRY(supine_patient_matching_create(
-      fuller, emptier, expandability ? REGIONAL_MAX : VERTICES_MAX, landmark_count, &m, error));
+      fuller, emptier, expandability ? REGIONAL_MAX : SUPINE_PATIENT_VERTICES_MAX, landmark_count,
+      &m, error));
   if (landmark_count > 0) {
     supine_patient_rows_of_pairs(&m.frame, landmarks, m.rows + m.count);
   }

@@ -112,6 +112,20 @@ static json_t *outliers_of(const supine_options_names *names, const observations
   return outliers;
 }
 
+/* Name each point that was left out as an outlier on standard error. */
+static void say_outliers(const supine_options_names *names, const observations *observed,
+                         const supine_locate_residual *residuals) {
+  for (size_t j = 0; j < observed->count; ++j) {
+    if (residuals[j].outlier) {
+      supine_options_say(name,
+                         "warning: point '%s' lies %.1f mm from where the other points predict it, "
+                         "where %.1f mm are expected: it is left out; check it",
+                         names->text[names->part[observed->points[j].vertex]],
+                         residuals[j].distance, residuals[j].sigma);
+    }
+  }
+}
+
 static void print(const request *wanted, const supine_options_names *names,
                   const observations *observed, size_t n, double volume,
                   const supine_posed_located *located) {
@@ -218,6 +232,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_findings findings = {.count = 0};
   supine_location_check(located.best, &findings);
   supine_options_say_findings(name, &findings);
+  say_outliers(&names, &observed, located.residuals);
   if (observed.count < OUTLIER_POINTS) {
     supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
                        (int)OUTLIER_POINTS);

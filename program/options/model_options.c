@@ -110,8 +110,8 @@ static supine_status read_lung(const char *text, void *field, supine_error *erro
       !(share > 0.0 && share <= 1.0)) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  SUPINE_REFUSE_IF(tissue->share[left ? 0 : 1] != 0.0, error, SUPINE_ERROR_ARGUMENT,
-                   "the %s lung is given twice: give it once", left ? "left" : "right");
+  SUPINE_REFUSE_IF(tissue->share[left ? 0 : 1] > 0.0, error, SUPINE_ERROR_ARGUMENT,
+                   "the %s lung is given twice: give its share once", left ? "left" : "right");
   tissue->share[left ? 0 : 1] = share;
   return SUPINE_OK;
 }

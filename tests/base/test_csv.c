@@ -82,7 +82,12 @@ TEST(test_csv_any_separator_reads_quotes) {
                                       "name\tvalue\n\"a,b\"\t1.5\n",
                                       "\xEF\xBB\xBF\"name\" , \"value\"\n \"a,b\" , 1.5",
                                       "sep=;\r\nname;value\r\n\"a,b\";1,5\r\n",
-                                      "name;value;notes, if any\n\"a,b\";1,5;x\n"};
+                                      "name;value;notes, if any\n\"a,b\";1,5;x\n",
+                                      "sep=\t\nname\tvalue\n\"a,b\"\t1.5\n",
+                                      "name,value\n,\n\"a,b\",\"1,5\"\n,\n",
+                                      "name\tvalue\tnote\n\t\t\na,b\t1,5\t\n",
+                                      "name,value (cm)\n\"a,b\",.15\n",
+                                      "name,value[mm]\n\"a,b\",1.5\n"};
   for (size_t i = 0; i < sizeof texts / sizeof *texts; ++i) {
     supine_csv csv;
     bool more = false;
@@ -106,6 +111,8 @@ TEST(test_csv_malformed_refused_with_line) {
       {"name,value\n\"two\nlines\",1\n\"\xC0\xAF\",2\n", ":4: the text is not UTF-8"},
       {"name,value\na,1\n\"open,2\nb,3\n", ":3: a quote is not closed: add \""},
       {"name,value\n\"a\"b,1\n", ":2: a quote is not closed"},
+      {"name,value (ell)\na,1\n", ":1: the unit of column \"value (ell)\" is unknown"},
+      {"name,value,value (mm)\na,1,1\n", ":1: repeated column \"value (mm)\""},
       {"name,value\n\"two\nlines\",1\nb\n", ":4: 1 field, but the header has 2"},
   };
   for (size_t i = 0; i < sizeof rows / sizeof *rows; ++i) {
@@ -123,6 +130,31 @@ TEST(test_csv_comment_in_latin_1_skipped) {
              "e\nname,value\na,1\n\n  # \xE4\nb,2");
   assert_int_equal(read_all(&count, NULL), SUPINE_OK);
   assert_int_equal(count, 2);
+}
+
+/* Excel's "Unicode text" is UTF-16 with tabs. */
+TEST(test_csv_utf_16_read) {
+  static const unsigned short text[] = {0xFEFF, 'n',    'a',    'm',  'e',  '\t', 'v',
+                                        'a',    'l',    'u',    'e',  '\r', '\n', 0xE9,
+                                        0x7ED3, 0xD83D, 0xDE00, '\t', '1',  ',',  '5'};
+  for (unsigned high = 0; high < 2; ++high) { /* which byte comes first */
+    FILE *file = fopen(path, "wb");
+    supine_csv csv;
+    bool more = false;
+    double value = 0.0;
+    assert_non_null(file);
+    for (size_t i = 0; i < sizeof text / sizeof *text; ++i) {
+      (void)putc(text[i] >> 8 * high & 0xFF, file);
+      (void)putc(text[i] >> 8 * (1 - high) & 0xFF, file);
+    }
+    assert_int_equal(fclose(file), 0);
+    assert_int_equal(supine_csv_open(path, columns, 2, 2, &csv, NULL), SUPINE_OK);
+    assert_int_equal(supine_csv_next(&csv, &more, NULL), SUPINE_OK);
+    assert_string_equal(supine_csv_text(&csv, 0), "\xC3\xA9\xE7\xBB\x93\xF0\x9F\x98\x80");
+    assert_int_equal(supine_csv_number(&csv, 1, "value", &value, NULL), SUPINE_OK);
+    assert_true(value == 1.5);
+    supine_csv_close(&csv);
+  }
 }
 
 TEST_GROUP(make_file, remove_file)

@@ -147,9 +147,9 @@ TEST(test_nrrd_bad_files_refused) {
       {"dimension: 3\nspace: LPS\nsizes: 10000 10000 10000\nspace directions: (1,0,0) (0,1,0) "
        "(0,0,1)\nspace origin: (0,0,0)\n",
        "do not fit in"},
-      {"dimension: 4\nspace: LPS\nsizes: 1 1 1 4\nspace directions: none (1,0,0) (0,1,0) "
+      {"dimension: 4\nspace: LPS\nsizes: 2 1 1 2\nspace directions: none (1,0,0) (0,1,0) "
        "(0,0,1)\nspace origin: (0,0,0)\n",
-       "dimension 4"},
+       "dimension is 4"},
       {"dimension: 3\nsizes: 1 2 2\nspacings: 1 1 1\n", "directions"},
       {"dimension: 3\nspace: LAS\nsizes: 1 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace "
        "origin: (0,0,0)\n",
@@ -172,6 +172,103 @@ TEST(test_nrrd_bad_files_refused) {
     write_bytes(in_folder("bad.nrrd"), text, (size_t)length);
     check_refused("bad.nrrd", SUPINE_ERROR_FORMAT, bad[i].said);
   }
+}
+
+/* What the field's tools read: no origin, hexadecimal digits, a last line of blanks, a segmentation
+ * of one layer, and units. */
+TEST(test_nrrd_unusual_files_read) {
+  static const struct {
+    const char *text;
+    double step; /* of the last axis */
+  } good[] = {
+      {"NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 2 1 2\nspace directions: (1,0,0) "
+       "(0,1,0) (0,0,2)\nencoding: hex\n\n04 05\n0607\n",
+       2.0},
+      {"NRRD0004\ntype: uchar\ndimension: 4\nspace: LPS\nsizes: 1 2 1 2\nkinds: list domain domain "
+       "domain\nspace directions: none (1,0,0) (0,1,0) (0,0,2)\nspace origin: (0,0,0)\nencoding: "
+       "raw\n \t\n\4\5\6\7",
+       2.0},
+      {"NRRD0004\ntype: uchar\ndimension: 4\nspace: LPS\nsizes: 2 1 2 1\nspace directions: (1,0,0) "
+       "(0,1,0) (0,0,2) none\nencoding: ascii\n\n4 5 6 7",
+       2.0},
+      {"NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nspace units: \"cm\" \"cm\" \"cm\"\n"
+       "sizes: 2 1 2\nspace directions: (.1,0,0) (0,.1,0) (0,0,.2)\nencoding: ascii\n\n4 5 6 7",
+       2.0}};
+  for (size_t i = 0; i < sizeof good / sizeof *good; ++i) {
+    supine_image image = {0};
+    supine_error error;
+    write_bytes(in_folder("good.nrrd"), good[i].text, strlen(good[i].text));
+    if (supine_image_read(in_folder("good.nrrd"), &image, &error) != SUPINE_OK) {
+      fail_msg("%s: %s", good[i].text, error.message);
+    }
+    assert_int_equal(image.size[2], 2);
+    assert_close(image.step[2][2], good[i].step, 1e-15);
+    assert_close(image.origin[0], 0.0, 0.0);
+    for (size_t v = 0; v < 4; ++v) {
+      assert_close(supine_image_get(&image, v), 4.0 + (double)v, 0.0);
+    }
+    supine_image_free(&image);
+  }
+}
+
+/* What a file should state and does not, or what contradicts it, is not assumed. */
+TEST(test_image_unstated_spacing_and_spare_voxels_refused) {
+#define MHA "ObjectType = Image\nNDims = 3\nDimSize = 2 1 2\nElementType = MET_UCHAR\n"
+#define NRRD                                                                                       \
+  "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 2 1 2\nspace directions: (1,0,0) "      \
+  "(0,1,0) "                                                                                       \
+  "(0,0,2)\n"
+  static const struct {
+    const char *name, *text, *said;
+  } bad[] = {
+      {"a.mha", MHA "ElementDataFile = LOCAL\nabcd", "states no voxel spacing"},
+      {"a.mha", MHA "Spacing = 1 1 2\nElementDataFile = LOCAL\nabcd", "name it ElementSpacing"},
+      {"a.mha", MHA "elementspacing = 1 1 2\nElementDataFile = LOCAL\nabcd",
+       "name it ElementSpacing"},
+      {"a.mha", MHA "ElementSpacing = 1 1 0\nElementDataFile = LOCAL\nabcd", "not above 0"},
+      {"a.mha", MHA "ElementSpacing = 1 1 2\nDistanceUnits = ell\nElementDataFile = LOCAL\nabcd",
+       "DistanceUnits"},
+      {"a.mha", MHA "ElementSpacing = 1 1 2\nElementDataFile = LOCAL\nabcdef", "more voxels"},
+      {"a.nrrd", NRRD "encoding: raw\n\nabcdef", "more voxels"},
+      {"a.nrrd", NRRD "encoding: ascii\n\n1 2 3 4 5 6", "more voxels"},
+      {"a.nrrd", NRRD "encoding: raw\nspace units: \"mm\" \"mm\" \"cm\"\n\nabcd", "space units"},
+      {"a.nrrd", NRRD "encoding: raw\nspace units: \"ell\"\n\nabcd", "space units"}};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
+    write_bytes(in_folder(bad[i].name), bad[i].text, strlen(bad[i].text));
+    check_refused(bad[i].name, SUPINE_ERROR_FORMAT, bad[i].said);
+  }
+  static const char cm[] =
+      MHA "Offset = 1 2 3\nElementSpacing = .1 .1 .2\nDistanceUnits = cm\nElementDataFile = "
+          "LOCAL\nabcd\n";
+  supine_image image = {0};
+  write_bytes(in_folder("cm.mha"), cm, sizeof cm - 1); /* one byte more is padding */
+  assert_int_equal(supine_image_read(in_folder("cm.mha"), &image, NULL), SUPINE_OK);
+  assert_close(image.step[2][2], 2.0, 0.0);
+  assert_close(image.origin[1], 20.0, 0.0);
+  supine_image_free(&image);
+}
+
+/* A qform has no lengths of its own: pixdim must state them. */
+TEST(test_nifti_qform_without_pixdim_refused) {
+  static const float wrong[] = {0.0F, -1.5F, NAN};
+  unsigned char bytes[472];
+  supine_image image = made(SUPINE_VOXEL_I16, 5);
+  supine_image read = {0};
+  assert_int_equal(supine_image_write(in_folder("q.nii"), &image, NULL, NULL), SUPINE_OK);
+  assert_int_equal(read_bytes(in_folder("q.nii"), bytes, sizeof bytes), sizeof bytes);
+  memcpy(bytes + 252, (const int16_t[]){1, 0}, 2 * sizeof(int16_t)); /* qform, no sform */
+  write_bytes(in_folder("q.nii"), bytes, sizeof bytes);
+  assert_int_equal(supine_image_read(in_folder("q.nii"), &read, NULL), SUPINE_OK);
+  assert_close(read.step[1][1], -1.1, 1e-6); /* the quaternion 0: no turn, from RAS */
+  supine_image_free(&read);
+  for (size_t i = 0; i < 3; ++i) {
+    unsigned char changed[472];
+    memcpy(changed, bytes, sizeof bytes);
+    memcpy(changed + 84, &wrong[i], sizeof wrong[i]);
+    write_bytes(in_folder("w.nii"), changed, sizeof changed);
+    check_refused("w.nii", SUPINE_ERROR_FORMAT, "pixdim[2]");
+  }
+  supine_image_free(&image);
 }
 
 #define NRRD_FRAME                                                                                 \
@@ -241,7 +338,8 @@ TEST(test_nrrd_header_variants_read) {
       {"TYPE:  Double \n", SUPINE_VOXEL_F64},
       {"type: uchar\r\n", SUPINE_VOXEL_U8},
       {"# a comment: with a colon\n#\ntype: uchar\n", SUPINE_VOXEL_U8},
-      {"type: uchar\nSegment0_Name:=left lung: upper lobe\nurn:x:=data file: y\n:=\n",
+      {"type: uchar\nSegment0_Name:=left lung: upper lobe\nurn:x:=data file: y\n:=\n"
+       "left: lobe:=upper: one\n \t# an indented comment\n",
        SUPINE_VOXEL_U8},
       {"type: uchar\ncontent:\nunits: \"mm\" \"mm\" \"mm\"\nkinds: domain domain domain\n"
        "labels: \"\" \"\" \"\"\nspace units: \"mm\" \"mm\" \"mm\"\n"
@@ -285,7 +383,8 @@ TEST(test_nrrd_malformed_headers_refused) {
   } bad[] = {{"NRRD0004", "NRRD0000", "first line"},
              {"NRRD0004", "NRRD0007", "first line"},
              {"NRRD0004", "NRRD0004 and more text", "first line"},
-             {"raw", "hex", "encoding"},
+             {"raw", "hex", "truncated or damaged"}, /* "abcd" has two bytes */
+             {"raw", "base64", "encoding"},
              {"raw", "bzip2", "encoding"},
              {"encoding: raw\n", "", "encoding"},
              {"raw\n", "raw\nbyte skip: -1\n", "skips"},

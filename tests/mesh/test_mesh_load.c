@@ -136,6 +136,96 @@ TEST(test_load_obj_byte_order_mark_and_continued_line_read) {
   supine_mesh_free(&mesh);
 }
 
+/* Comments end with their line, and names may hold their sign. */
+TEST(test_load_obj_comments_ignored) {
+  char path[256];
+  supine_mesh mesh =
+      load(sample_text(state, "c.obj",
+                       "# a path: C:\\lungs\\\nv 0 0 0 # 1 \\\nv 120 0 0\n"
+                       "v 0 120 0\nv 0 0 120\no lung#1\nf 1 3 2 # base\nf 1 2 \\\n4 # "
+                       "back\nf 1 4 3#left\nf 2 3 4\n",
+                       path),
+           NULL, NULL);
+  expect_tetrahedron(&mesh);
+  supine_mesh_free(&mesh);
+}
+
+/* The normals of facets without area, as compilers of Microsoft print them. */
+TEST(test_load_stl_normals_not_numbers_read) {
+  static const char *const normals[] = {"-nan(ind) -nan(ind) -nan(ind)", "-1.#IND 1.#INF 1.#QNAN",
+                                        "nan nan inf"};
+  for (size_t i = 0; i < sizeof normals / sizeof *normals; ++i) {
+    char text[1024];
+    char path[256];
+    const char *at = strstr(tetrahedron_stl, "0 0 -1");
+    (void)snprintf(text, sizeof text, "%.*s%s%s", (int)(at - tetrahedron_stl), tetrahedron_stl,
+                   normals[i], at + strlen("0 0 -1"));
+    supine_mesh mesh = load(sample_text(state, "n.stl", text, path), NULL, NULL);
+    expect_tetrahedron(&mesh);
+    supine_mesh_free(&mesh);
+  }
+}
+
+/* A file that holds more than it counts is not cut: a whole lung could be lost. */
+TEST(test_load_more_than_counted_refused) {
+  static unsigned char binary[84 + 4 * 50];
+  char path[256];
+  for (unsigned char count = 0; count <= 4; ++count) {
+    binary[80] = count;
+    for (size_t t = 0; t < 4; ++t) {
+      const float corners[9] = {(float)t, 0.0F, 0.0F, (float)t, 120.0F, 0.0F, (float)t, 0.0F, 9.0F};
+      memcpy(binary + 84 + 50 * t + 12, corners, sizeof corners);
+    }
+    (void)sample_path(state, "b.stl", path);
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(binary, sizeof binary, 1, file), 1);
+    assert_int_equal(fclose(file), 0);
+    if (count % 4 == 0) { /* 0: the file does not count */
+      supine_mesh mesh = load(path, NULL, NULL);
+      assert_int_equal(mesh.triangle_count, 4);
+      supine_mesh_free(&mesh);
+    } else {
+      expect_refused(path, NULL, SUPINE_ERROR_FORMAT, "but it has room for 4");
+    }
+  }
+  refuse_text(state, "more.ply",
+              "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+              "y\nproperty float z\nelement face 1\nproperty list uchar int "
+              "vertex_indices\nend_header\n0 0 0\n120 0 0\n0 120 0\n3 0 1 2\n3 0 2 1\n",
+              SUPINE_ERROR_FORMAT, "follow what the PLY header counts");
+}
+
+#define AMF(unit)                                                                                  \
+  "<?xml version=\"1.0\"?>\n<amf" unit " version=\"1.1\"><object id=\"0\"><mesh><vertices>"        \
+  "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"                           \
+  "<vertex><coordinates><x>0</x><y>2</y><z>0</z></coordinates></vertex>"                           \
+  "<vertex><coordinates><x>0</x><y>0</y><z>3</z></coordinates></vertex></vertices><volume>"        \
+  "<triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>\n"
+
+TEST(test_load_amf_unit_of_the_file_used) {
+  static const struct {
+    const char *text;
+    double millimetres;
+  } files[] = {{AMF(""), 1.0},
+               {AMF(" unit=\"millimeter\""), 1.0},
+               {AMF(" unit='inch'"), 25.4},
+               {AMF(" unit=\"feet\""), 304.8},
+               {AMF(" unit=\"meter\""), 1000.0},
+               {AMF(" unit=\"micron\""), 0.001}};
+  char path[256];
+  for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
+    supine_mesh mesh = load(sample_text(state, "u.amf", files[i].text, path), NULL, NULL);
+    assert_true(fabs(mesh.vertices[4] - 2.0 * files[i].millimetres) < 1e-12);
+    supine_mesh_free(&mesh);
+  }
+  const supine_mesh_load_options cm = {.millimetres_per_unit = 10.0}; /* replaces the file's unit */
+  supine_mesh mesh = load(sample_text(state, "u.amf", AMF(" unit=\"inch\""), path), &cm, NULL);
+  assert_true(mesh.vertices[4] == 20.0);
+  supine_mesh_free(&mesh);
+  refuse_text(state, "u.amf", AMF(" unit=\"ell\""), SUPINE_ERROR_FORMAT, "unit \"ell\" is unknown");
+}
+
 TEST(test_load_legacy_vtk_conversion_named) {
   refuse_text(state, "old.vtk", "# vtk DataFile Version 4.2\n", SUPINE_ERROR_FORMAT,
               "save the surface as .vtp or .ply");

@@ -2,12 +2,14 @@
 /* Test the fit of a displacement law to a patient's landmarks: held-out errors, recovery of known
  * constants, files of fitted laws, refused input. */
 #include "tests/helpers/test.h"
+#include "tests/helpers/sh_helpers.h"
 
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
 #include <supine/volume.h>
 
+#include "base/vec3.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/lungs/surface.h"
 #include "precompute/patient/krige.h"
@@ -350,6 +352,33 @@ TEST(test_fit_more_points_than_kept_refused) {
                    SUPINE_ERROR_FORMAT);
   assert_says(error.message, "901 points to fit, more than 900");
   free(rows);
+  supine_patient_pairs_free(&pairs);
+}
+
+/* Pairs that are thinned stay in order, and lie farther apart than pairs taken at random. */
+TEST(test_pairs_thin_many_spread_evenly) {
+  enum { MANY = 2000, FEW = 60 };
+  uint64_t seed = 5;
+  supine_patient_pairs pairs = {.count = MANY,
+                                .from = malloc(3 * MANY * sizeof(double)),
+                                .to = malloc(3 * MANY * sizeof(double))};
+  for (size_t i = 0; i < 3 * MANY; ++i) { /* dense near 0 */
+    pairs.from[i] = pow(random_signed(&seed), 3.0) * 100.0;
+    pairs.to[i] = pairs.from[i] + (double)(i / 3);
+  }
+  assert_int_equal(supine_patient_pairs_thin(&pairs, MANY, NULL), SUPINE_OK);
+  assert_int_equal(pairs.count, MANY);
+  assert_int_equal(supine_patient_pairs_thin(&pairs, FEW, NULL), SUPINE_OK);
+  assert_int_equal(pairs.count, FEW);
+  double nearest = INFINITY;
+  for (size_t i = 0; i < FEW; ++i) {
+    assert_true(i == 0 || pairs.to[3 * i] - pairs.from[3 * i] >
+                              pairs.to[3 * i - 3] - pairs.from[3 * i - 3] + 0.5);
+    for (size_t j = 0; j < i; ++j) {
+      nearest = fmin(nearest, supine_distance(pairs.from + 3 * i, pairs.from + 3 * j));
+    }
+  }
+  assert_true(nearest > 30.0); /* of 60 pairs at random, the nearest are about 1 mm apart */
   supine_patient_pairs_free(&pairs);
 }
 

@@ -27,6 +27,8 @@ python3 "$cohort/bids.py" data out participant --participant_label 02 -- --band 
   fail "one participant: $(cat said)"
 [ "$(ls out)" = "dataset_description.json
 sub-02" ] || fail "one participant left $(ls out)"
+python3 "$cohort/bids.py" data out participant --participant_label ../data/sub-02 >said 2>&1 && fail "a label leaves its folder"
+grep -q "cannot be the name of a subject" said || fail "$(cat said)"
 python3 "$cohort/bids.py" data out participant -- --band 2 >said 2>&1 || fail "participants: $(cat said)"
 python3 "$cohort/bids.py" data out group >said 2>&1 || fail "group: $(cat said)"
 for i in 01 02; do

@@ -55,4 +55,14 @@ cmp -s before.json results/sub-08/result.json || fail "another subject was compu
 rm -r results/sub-09
 flow "$@" || fail "the fourth run"
 grep -q '^subject *1' said || fail "one missing result recomputed: $(grep -A6 '^job' said)"
+# A name never leaves the folder of the results, and may have signs of regular expressions.
+for wrong in ../evil a/b .. group.csv 'a{b}'; do
+  printf 'subject,meshes,options\n%s,meshes/01.ply,--band 2\n' "$wrong" >subjects.csv
+  flow "$@" && fail "the name $wrong is not refused"
+  grep -q "cannot be the name of a subject" said || fail "$wrong: $(cat said)"
+  [ ! -e evil ] && [ ! -e results/b ] || fail "$wrong left its folder"
+done
+printf 'subject,meshes,options\na+b (1),meshes/01.ply,--band 2\n' >subjects.csv
+flow "$@" || fail "a+b: $(tail -5 said)"
+[ -s "results/a+b (1)/basis.safetensors" ] || fail "no results of a+b: $(ls results)"
 [ $failures -eq 0 ] || exit 1

@@ -255,6 +255,7 @@ class Basis:
 
     def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
                  allow_folds: bool = False) -> None:
+        self._options = {"storage": storage, "simd": simd, "normals": normals, "allow_folds": allow_folds}
         options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals, allow_folds)
         self._owner = _Owner(source, options)
         self._c = self._owner.pointer
@@ -285,6 +286,16 @@ class Basis:
         self.modes: Doubles = self._tensor("modes")
         self.bounds: Floats = self._owner.view(ctypes.cast(info.bounds, ctypes.c_void_p).value or 0, ctypes.c_float,
                                                (count, 2, 3))
+
+    def __reduce__(self) -> Any:
+        """Pickle what the basis was opened from: its bytes, or the absolute path of its file. It is opened again where it is
+        unpickled, as in the workers of a data loader."""
+        source = self._owner.source
+        if isinstance(source, (bytearray, memoryview)):
+            source = bytes(source)
+        elif not isinstance(source, bytes):
+            source = os.path.abspath(source)
+        return _open, (source, self.report, self._options)
 
     def __repr__(self) -> str:
         return (f"<supine.Basis: {self.vertex_count} vertices, {self.triangle_count} triangles, "
@@ -547,6 +558,9 @@ class Location:
         self.sigmas: Doubles = np.array([r.sigma for r in residuals])
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])
 
+    def __reduce__(self) -> Any:
+        raise TypeError("a location cannot be pickled, as it refers to memory of the C library: pickle the observed positions")
+
     def positions(self, basis: Basis) -> tuple[Floats, Floats]:
         """Compute the positions [N, 3] of the vertices of `basis` in the frame of the observations, and their expected
         errors [N], mm. `basis` must be of the same lungs."""
@@ -601,7 +615,7 @@ def embed(lungs: Basis, *content: Any, progress: Optional[_program.Progress] = N
     return _open(*_program.make("embed", lungs._owner.source, content, options, progress))
 
 
-def _open(source: Source, report: str) -> Basis:
-    basis = Basis(source)
+def _open(source: Source, report: str, options: Optional[dict[str, Any]] = None) -> Basis:
+    basis = Basis(source, **(options or {}))
     basis.report = report
     return basis

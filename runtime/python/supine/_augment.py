@@ -15,6 +15,7 @@ from typing import Any, Iterator, Optional, Sequence, Union
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _library as _c
 from . import _program
 
 VOXELS = {"int8": "int8", "uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32", "uint32": "uint32",
@@ -131,9 +132,7 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
     from . import embed  # the package imports this module
 
     if image is not None and labels is not None and image.shape != labels.shape:
-        raise ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
-    if image is not None and labels is not None and image.shape != labels.shape:
-        raise ValueError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
+        raise _c.ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
     inside = None if points is None else embed(lungs, points)
     order = None if inside is None else np.argsort(inside.tensor("part"), kind="stable")  # a basis groups points by lung

@@ -19,7 +19,16 @@ def _path(name: str) -> Optional[str]:
     return beside if os.path.exists(beside) else ctypes.util.find_library(name)
 
 
-_c = ctypes.CDLL(_path("supine_runtime"))
+def _load() -> ctypes.CDLL:
+    """Load the run-time library."""
+    path = _path("supine_runtime")
+    if path is None:
+        raise ImportError("the library supine_runtime is neither beside the package nor in the system: install the wheel, or "
+                          "the library, or copy libsupine_runtime.so into " + os.path.dirname(__file__))
+    return ctypes.CDLL(path)
+
+
+_c = _load()
 
 
 class Error(Exception):

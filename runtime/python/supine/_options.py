@@ -134,6 +134,8 @@ def _lung(to: _c.PrecomputeOptions, value: Any) -> None:
     for side, share in _pairs("lung", value, ":", wants):
         if side not in ("left", "right"):
             raise _refuse("lung", wants, value)
+        if to.tissue.share[("left", "right").index(side)] > 0:
+            raise _c.ArgumentError(f"lung: the {side} lung is given twice: give its share once")
         to.tissue.share[("left", "right").index(side)] = _number("lung", share, wants)
 
 

@@ -84,9 +84,13 @@ def table(rows: Iterable[Sequence[Any]]) -> bytes:
 
 def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[float]]]) -> None:
     """Write points [n, 3], or a dict from names to points, as CSV."""
+    for name, place in points.items() if isinstance(points, Mapping) else ():
+        if np.shape(place) != (3,):
+            raise ValueError(f"point {name!r} must be three numbers x, y, z, not {list(np.shape(place))}: give each point a "
+                             "name of its own")
     names = [[name] for name in points] if isinstance(points, Mapping) else None
     places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
-    if places.size == 0 or places.shape[-1] != 3:
+    if places.size == 0 or places.ndim > 2 or places.shape[-1] != 3:
         raise ValueError(f"points must be [n, 3], not {list(places.shape)}")
     rows = places.reshape(-1, 3).tolist()
     with open(path, "wb") as file:
