@@ -258,7 +258,7 @@ DOORS = [
     ("deform --gravity", "command", "gravity",
      lambda x: command("deform", "lungs.st", "--gravity", x, "-o", "out.ply")),
     ("pose([x, y, z])", "Python", "gravity", lambda x: python(lambda: lungs.pose(numbers(x)))),
-    ("pose([x, y, z])", "JavaScript", "gravity", lambda x: javascript(numbers(x), "lungs.st")),
+    ("pose({gravity})", "JavaScript", "gravity", lambda x: javascript({"gravity": numbers(x)}, "lungs.st")),
     ("compare --breath", "command", "breath",
      lambda x: command("compare", "lungs.st", "--postures", "supine", "--breath", x)),
     ("export --breath", "command", "breath", lambda x: command("export", "lungs.st", "--breath", x, "-o", "out.html")),
