@@ -15,9 +15,8 @@
 #     supine-<version>.tgz                               npm package
 #     supine-<version>.spdx  RELEASE.md  SHA256SUMS      licences of the source files, release notes, checksums
 #
-# Needed in addition to the packages of `sh cmake/debian.sh build`: python3-wheel, python3-setuptools, reuse, clang, lld,
-# wasi-libc, libclang-rt-dev-wasm32, binaryen, gcc-aarch64-linux-gnu, libc6-dev-arm64-cross. Exit with 77 if a tool is
-# missing. SUPINE_WORK names a folder that keeps the build for the next run.
+# Needed in addition to the packages of `sh cmake/debian.sh build`: python3-wheel, python3-setuptools, reuse,
+# gcc-aarch64-linux-gnu, libc6-dev-arm64-cross. Exit with 77 if a tool is missing. SUPINE_WORK names a folder that keeps the build for the next run.
 set -eu
 umask 022
 export LC_ALL=C
@@ -26,7 +25,7 @@ fail() {
   echo "release.sh: $*" >&2
   exit 1
 }
-for tool in git cmake ninja cpack dpkg-shlibdeps help2man reuse clang wasm-ld wasm-opt aarch64-linux-gnu-gcc /usr/bin/python3; do
+for tool in git cmake ninja cpack dpkg-shlibdeps help2man reuse aarch64-linux-gnu-gcc /usr/bin/python3; do
   command -v "$tool" >/dev/null || { echo "release.sh: $tool is not installed"; exit 77; }
 done
 /usr/bin/python3 -c 'import setuptools, wheel' 2>/dev/null || { echo "release.sh: no python3-setuptools and python3-wheel"; exit 77; }

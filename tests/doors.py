@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Give each input of each interface (a door) every kind of mistake that such an input can have: the matrix of the tables
-DOORS and MISTAKES. A mistake must be told or refused, as the table of checks (docs/inputs.md) says where it has a row for
-it. The right input beside it must be taken without a word.
+"""Give each input of each interface (a door) every kind of mistake that such an input can have: the matrix of the
+tables DOORS and MISTAKES. A mistake must be told or refused, as the table of checks (docs/inputs.md) says where it has a row
+for it. The right input beside it must be taken without a word.
 
     python3 tests/doors.py [BUILD_FOLDER [DOOR]]
 
 Lungs are those of examples/lungs; another person's are synthetic. To add an input, add one row to DOORS and, if its data
 are of a new type, the mistakes of this type to MISTAKES. Whatever is taken today is listed in KNOWN, by the topic of the
 work that will mend it. The test fails if anything else is taken, and if a known case is mended: then delete its line."""
+import functools
+import json
 import os
 import shutil
+import subprocess
 import sys
 
-from helpers.verdict import (SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table,
+from helpers.verdict import (SOURCE, SUPINE, command, even, folder, javascript, pose_in_c, python, stream, supine, table,
                              transform, write_ply)
 import numpy as np
 
@@ -190,6 +193,8 @@ MISTAKES = {
                           "repeated": "rest+300+300"}),
     "state": (None, "", {RIGHT: "prone:rest", "unit": "prone:4000", "range": "prone:rest+9000", "finite": "prone:inf",
                          "cut": "pron", "repeated": "prone:rest:full"}),
+    "posture": (None, "", {RIGHT: "left+15", "range": "left+100", "finite": "0:nan:0", "cut": "pron",
+                           "repeated": "left+15+15"}),
     "gravity": (None, "", {RIGHT: "0,-1,0", "range": "0,0,0", "finite": "0,nan,0", "cut": "0,-1",
                            "repeated": "0,-1,0,0,-1,0"}),
     "breath": (None, "", {RIGHT: "500", "unit": "0.5", "range": "9000", "finite": "nan", "cut": ""}),
@@ -206,6 +211,19 @@ MISTAKES = {
 
 def numbers(text):
     return [float(x) for x in text.split(",")]
+
+
+@functools.lru_cache
+def page():
+    """Type the postures into a page in Chromium; return the verdicts, or nothing if it cannot run."""
+    texts = list(MISTAKES["posture"][2].values())
+    assert command("export", "lungs.st", "-o", "lungs.html")[0] == "taken"
+    where = os.path.join(SOURCE, "tests/export")
+    tools = {"MODULES": where, "CHROMIUM": shutil.which("chromium") or "", "SUPINE": SUPINE}
+    done = subprocess.run(["node", os.path.join(where, "page_door.mjs"), "lungs.html", *texts], capture_output=True,
+                          text=True, env={**tools, **os.environ}, check=False)
+    assert done.returncode in (0, 77), done.stderr
+    return dict(zip(texts, map(tuple, json.loads(done.stdout)))) if done.returncode == 0 else {}
 
 
 DOORS = [
@@ -255,10 +273,13 @@ DOORS = [
     ("supine_state_parse", "C", "state", lambda x: python(lambda: pose_in_c(lungs, x))),
     ("pose()", "Python", "state", lambda x: python(lambda: lungs.pose(x))),
     ("pose()", "JavaScript", "state", lambda x: javascript(x, "lungs.st")),
+    ("solve --posture", "command", "posture", lambda x: command("solve", "other.ply", "--posture", x, "-o", "out.ply")),
+    ("gravity()", "Python", "posture", lambda x: python(lambda: supine.gravity(x))),
+    ("posture", "page", "posture", lambda x: page().get(x)),
     ("deform --gravity", "command", "gravity",
      lambda x: command("deform", "lungs.st", "--gravity", x, "-o", "out.ply")),
     ("pose([x, y, z])", "Python", "gravity", lambda x: python(lambda: lungs.pose(numbers(x)))),
-    ("pose([x, y, z])", "JavaScript", "gravity", lambda x: javascript(numbers(x), "lungs.st")),
+    ("pose({gravity})", "JavaScript", "gravity", lambda x: javascript({"gravity": numbers(x)}, "lungs.st")),
     ("compare --breath", "command", "breath",
      lambda x: command("compare", "lungs.st", "--postures", "supine", "--breath", x)),
     ("export --breath", "command", "breath", lambda x: command("export", "lungs.st", "--breath", x, "-o", "out.html")),
@@ -285,8 +306,8 @@ ROWS = {("scan", "person"): "person-depth-least", ("scan", "swapped"): "rest-mos
         ("fields", "unit"): "fields-unit", ("fields", "range"): "fields-run-size",
         ("fields", "shifted"): "fields-run-error", ("fields", "swapped"): "fields-left-out",
         ("volume", "range"): "volume-most", ("volume", "finite"): "volume-finite", ("state", "range"): "volume-most",
-        ("state", "finite"): "volume-finite", ("state", "cut"): "suggestion", ("breath", "range"): "breath",
-        ("pose", "repeated"): "tracker-invalid"}
+        ("state", "finite"): "volume-finite", ("state", "cut"): "suggestion", ("posture", "range"): "tilt",
+        ("breath", "range"): "breath", ("pose", "repeated"): "tracker-invalid"}
 
 # Mistakes that are taken today, or get different verdicts: door, kind, and the topic of the work that will mend them.
 KNOWN = {

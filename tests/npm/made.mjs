@@ -7,7 +7,7 @@ import { copyFileSync, existsSync, mkdirSync, readFileSync, writeFileSync } from
 import { join } from 'node:path';
 import { breathingFieldsBasis, folder, skip, supine } from '../export/support.mjs';
 
-if (!existsSync(process.env.TARBALL)) skip('no package: clang, lld, wasi-libc and libclang-rt-dev-wasm32 make it');
+if (!existsSync(process.env.TARBALL)) skip('no package: build the target npm');
 export const packed = join(folder, 'node_modules/supine');
 mkdirSync(packed, { recursive: true });
 execFileSync('tar', ['xzf', process.env.TARBALL, '-C', packed, '--strip-components=1']);
