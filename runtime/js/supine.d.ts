@@ -12,8 +12,8 @@ export interface Tensor {
 }
 
 /** A named structure: the mean position `at` of its vertices, its displacement `move`, the length `mm` of this
- * displacement, and its expected error (3-D RMS). Lengths are in mm. `anatomy` is true for a large part, such as airways,
- * vessels or a lobe, of which these are means, and false for a target. */
+ * displacement, and its expected error (3-D RMS). Lengths are in mm. `anatomy` is true for a large part, such as
+ * airways, vessels or a lobe, of which these are means, and false for a target. */
 export interface Target {
   name: string;
   lung: string;
@@ -98,7 +98,8 @@ export interface Basis {
 
 /** A failure that the library reports, with its message. */
 export class SupineError extends Error {
-  readonly status: 'argument' | 'memory' | 'read' | 'format' | 'mesh' | 'open surface' | 'unsupported' | 'write' | 'numerical';
+  readonly status:
+    'argument' | 'memory' | 'read' | 'format' | 'mesh' | 'open surface' | 'unsupported' | 'write' | 'numerical';
 }
 
 /** What `open` takes: the bytes of a basis file; a Blob or a Response with them; a path (in node) or an address. */
@@ -118,7 +119,6 @@ export interface OpenOptions {
 /** Metadata "checksum" of a file that `open` completes with its option `seal`. */
 export const UNSEALED: string;
 
-/** Open a basis file: check all of its bytes, and copy them. After a failure, for example to fetch supine.wasm, a further
- * call tries again.
- * @throws SupineError */
+/** Open a basis file: check all of its bytes, and copy them. After a failure, for example to fetch supine.wasm, a
+ * further call tries again. @throws SupineError */
 export function open(source: Source | Promise<Source>, options?: OpenOptions): Promise<Basis>;

@@ -26,7 +26,16 @@ const FACT = { value: 0, name: 24, unit: 28, origin: 32, source: 36, text: 40, s
 // Types of tensors, in the order of supine_dtype.
 const TYPES = [Uint8Array, Uint32Array, Float32Array, Float64Array, Int16Array, Int8Array, Uint16Array];
 const STATUS = [
-  'ok', 'argument', 'memory', 'read', 'format', 'mesh', 'open surface', 'unsupported', 'write', 'numerical',
+  'ok',
+  'argument',
+  'memory',
+  'read',
+  'format',
+  'mesh',
+  'open surface',
+  'unsupported',
+  'write',
+  'numerical',
 ];
 
 export class SupineError extends Error {
@@ -70,8 +79,23 @@ function meanOf({ count, at, move, expectedError, ...target }) {
 }
 
 class Basis {
-  #c; #basis; #lit; #hasVolume; #uniforms; #frames;
-  #state; #pose; #nextState; #nextPose; #volumes; #text; #error; #positions; #normals; #expected; #facts;
+  #c;
+  #basis;
+  #lit;
+  #hasVolume;
+  #uniforms;
+  #frames;
+  #state;
+  #pose;
+  #nextState;
+  #nextPose;
+  #volumes;
+  #text;
+  #error;
+  #positions;
+  #normals;
+  #expected;
+  #facts;
 
   constructor(instance, bytes, options) {
     this.#c = instance.exports;
@@ -164,7 +188,8 @@ class Basis {
   }
 
   tensor(name) {
-    const at = this.#c.supine_basis_tensor(this.#basis, this.#write(name)); // a supine_tensor: name, dtype, rank, shape[4], data
+    // A supine_tensor: name, dtype, rank, shape[4], data
+    const at = this.#c.supine_basis_tensor(this.#basis, this.#write(name));
     if (at === 0) return undefined;
     const [, type, rank, a, b, c, d, data] = this.#view(Uint32Array, at, 8);
     const shape = [a, b, c, d].slice(0, rank);

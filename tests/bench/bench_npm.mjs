@@ -12,7 +12,10 @@ import { demo, packed } from '../npm/made.mjs';
 const { open } = await import(join(packed, 'supine.js'));
 const lungs = await open(readFileSync(demo));
 lungs.pose('prone');
-const fastest = [[Infinity, Infinity], [Infinity, Infinity]];
+const fastest = [
+  [Infinity, Infinity],
+  [Infinity, Infinity],
+];
 const calls = Math.ceil(1000000 / lungs.vertexCount);
 for (let round = 0; round < 5; ++round) {
   const c = execFileSync(process.env.NATIVE, [demo, 'prone'], { encoding: 'utf8' }).split(' ').map(Number);
@@ -26,4 +29,7 @@ for (let round = 0; round < 5; ++round) {
   }
 }
 const ratios = fastest[0].map((taken, i) => taken / fastest[1][i]);
-console.log(`ns per vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ratios ${ratios.map((x) => x.toFixed(2))}`);
+console.log(
+  `ns per vertex of deform and deformLit: ${fastest[0].map((x) => x.toFixed(2))}; in plain C ${fastest[1]}; ` +
+    `ratios ${ratios.map((x) => x.toFixed(2))}`,
+);

@@ -6,9 +6,9 @@
 //
 // Needs playwright-core (npm install in tests/export, or in the folder of the environment variable MODULES). Chromium
 // draws in software unless FLAGs choose a graphics card: --enable-gpu and --use-angle=gl or --use-angle=vulkan.
-// "still" is a frame that draws the surface without deforming it. "turning" is a frame while the patient turns: weights,
-// positions, normals and drawing. "script" is the time of the CPU in such a frame. The ratio of turning to still is the
-// cost of deforming and drawing relative to drawing alone.
+// "still" is a frame that draws the surface without deforming it. "turning" is a frame while the patient turns:
+// weights, positions, normals and drawing. "script" is the time of the CPU in such a frame. The ratio of turning to
+// still is the cost of deforming and drawing relative to drawing alone.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -24,7 +24,13 @@ const { chromium } = require('playwright-core');
 const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
 const browser = await chromium.launch({
   executablePath,
-  args: ['--headless', '--no-sandbox', '--no-first-run', '--disable-background-networking', ...(flags.length ? flags : software)],
+  args: [
+    '--headless',
+    '--no-sandbox',
+    '--no-first-run',
+    '--disable-background-networking',
+    ...(flags.length ? flags : software),
+  ],
 });
 const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, reducedMotion: 'reduce' });
 page.setDefaultTimeout(300000);
@@ -46,11 +52,16 @@ const found = await page.evaluate(() => {
     weights,
     deform: () => picture.deform('now', state.moment),
     still: () => picture.draw(panes()),
-    turning: () => { weights(); picture.deform('now', state.moment); picture.draw(panes()); },
+    turning: () => {
+      weights();
+      picture.deform('now', state.moment);
+      picture.draw(panes());
+    },
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
   const some = 20; // frames per measurement, because the clock of a browser has steps of 0.1 ms
-  for (let i = 0; i < 60; ++i) { // 60 x 20 frames, so that the script is compiled and optimised
+  for (let i = 0; i < 60; ++i) {
+    // 60 x 20 frames, so that the script is compiled and optimised
     const begin = performance.now();
     for (let j = 0; j < some; ++j) {
       tilt += 1;
@@ -72,7 +83,10 @@ const found = await page.evaluate(() => {
   const names = gl.getExtension('WEBGL_debug_renderer_info');
   return {
     renderer: gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER),
-    vertices: basis.vertices, triangles: basis.corners.length / 3, modes: basis.modes, times,
+    vertices: basis.vertices,
+    triangles: basis.corners.length / 3,
+    modes: basis.modes,
+    times,
   };
 });
 await browser.close();

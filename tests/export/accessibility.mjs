@@ -13,14 +13,22 @@ supine('compare', basis, '--postures', 'supine,prone,left,supine+15', '-o', repo
 
 async function check(page, what) {
   await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }));
-  assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`), [], what);
+  const { violations } = await page.evaluate(() =>
+    window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }),
+  );
+  assert.deepEqual(
+    violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`),
+    [],
+    what,
+  );
 }
 
 /** Return the contrast of two CSS colours as defined by WCAG. */
 function contrast(a, b) {
   const luminance = (hex) => {
-    const [r, g, bl] = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    const [r, g, bl] = [1, 3, 5]
+      .map((i) => parseInt(hex.slice(i, i + 2), 16) / 255)
+      .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
     return 0.2126 * r + 0.7152 * g + 0.0722 * bl;
   };
   const [low, high] = [luminance(a), luminance(b)].sort((x, y) => x - y);
@@ -28,20 +36,44 @@ function contrast(a, b) {
 }
 
 for (const colorScheme of ['light', 'dark']) {
-  const { page, complaints } = await openLungs(html, { colorScheme }, '#probes=3.250&colour=difference&show=beside.ghost');
-  await page.evaluate(() => { for (const details of document.querySelectorAll('details')) details.open = true; });
+  const { page, complaints } = await openLungs(
+    html,
+    { colorScheme },
+    '#probes=3.250&colour=difference&show=beside.ghost',
+  );
+  await page.evaluate(() => {
+    for (const details of document.querySelectorAll('details')) details.open = true;
+  });
   await check(page, `the page, ${colorScheme}`);
-  const nameless = await page.evaluate(() => [...document.querySelectorAll('button, input, select, canvas[tabindex]')].filter((e) => {
-    const label = e.getAttribute('aria-label') ?? (e.labels?.length ? [...e.labels].map((l) => l.textContent).join() : e.textContent);
-    return !label?.trim();
-  }).map((e) => e.outerHTML));
+  const nameless = await page.evaluate(() =>
+    [...document.querySelectorAll('button, input, select, canvas[tabindex]')]
+      .filter((e) => {
+        const label =
+          e.getAttribute('aria-label') ??
+          (e.labels?.length ? [...e.labels].map((l) => l.textContent).join() : e.textContent);
+        return !label?.trim();
+      })
+      .map((e) => e.outerHTML),
+  );
   assert.deepEqual(nameless, []);
   const colours = await page.evaluate(() => {
     const style = getComputedStyle(document.documentElement);
-    return Object.fromEntries(['edge', 'accent', 'accent-ink', 'paper-solid', 'field', 'change', 'ink', 'back'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    return Object.fromEntries(
+      ['edge', 'accent', 'accent-ink', 'paper-solid', 'field', 'change', 'ink', 'back'].map((name) => [
+        name,
+        style.getPropertyValue(`--${name}`).trim(),
+      ]),
+    );
   });
   const long = (hex) => (hex.length === 4 ? `#${[...hex.slice(1)].map((c) => c + c).join('')}` : hex);
-  for (const [a, b] of [['edge', 'paper-solid'], ['accent', 'paper-solid'], ['accent', 'field'], ['accent', 'accent-ink'], ['change', 'paper-solid'], ['ink', 'back']]) {
+  for (const [a, b] of [
+    ['edge', 'paper-solid'],
+    ['accent', 'paper-solid'],
+    ['accent', 'field'],
+    ['accent', 'accent-ink'],
+    ['change', 'paper-solid'],
+    ['ink', 'back'],
+  ]) {
     const ratio = contrast(long(colours[a]), long(colours[b]));
     assert.ok(ratio >= 3, `${colorScheme}: ${a} on ${b} is ${ratio.toFixed(2)}`);
   }

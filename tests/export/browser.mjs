@@ -9,27 +9,49 @@ if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no
 
 export const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM,
-  args: ['--headless', '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader', '--disable-gpu-compositing', '--disable-background-networking', '--disable-component-update',
-    '--disable-sync', '--no-first-run'],
+  args: [
+    '--headless',
+    '--no-sandbox',
+    '--use-gl=angle',
+    '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader',
+    '--disable-gpu-compositing',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+    '--no-first-run',
+  ],
 });
 
 /** Add the page's errors and warnings to `complaints`. */
 export function listen(page, complaints) {
   page.on('console', (message) => {
     const text = message.text();
-    const ofCompositor = text.includes('GPU stall due to ReadPixels'); // without a GPU, Chromium itself reads pixels back, and warns of it
+    // Without a GPU, Chromium itself reads pixels back, and warns of it
+    const ofCompositor = text.includes('GPU stall due to ReadPixels');
     if (['error', 'warning'].includes(message.type()) && !ofCompositor) complaints.push(text);
   });
   page.on('pageerror', (error) => complaints.push(error.stack));
 }
 
-const unused = new Map(); // closed pages to use again, by device properties: a new page takes a second of processor time
+// Closed pages to use again, by device properties: a new page takes a second of processor time
+const unused = new Map();
 
 /** Open a file, and collect its errors and its requests for other files. */
-export async function open(path, { viewport = { width: 900, height: 640 }, colorScheme = 'light', forcedColors = 'none', reducedMotion = 'reduce', init, ...device } = {}, hash = '') {
+export async function open(
+  path,
+  {
+    viewport = { width: 900, height: 640 },
+    colorScheme = 'light',
+    forcedColors = 'none',
+    reducedMotion = 'reduce',
+    init,
+    ...device
+  } = {},
+  hash = '',
+) {
   const kind = JSON.stringify(device);
-  const page = (!init && unused.get(kind)?.pop()) || await browser.newPage(device);
+  const page = (!init && unused.get(kind)?.pop()) || (await browser.newPage(device));
   page.setDefaultTimeout(120000); // ms, long enough on a busy machine
   await page.setViewportSize(viewport);
   await page.emulateMedia({ colorScheme, forcedColors, reducedMotion });
@@ -38,7 +60,9 @@ export async function open(path, { viewport = { width: 900, height: 640 }, color
   const complaints = [];
   listen(page, complaints);
   const own = pathToFileURL(path).href;
-  page.on('request', (request) => { if (request.url() !== own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`); });
+  page.on('request', (request) => {
+    if (request.url() !== own && !/^(data|blob):/.test(request.url())) complaints.push(`asked for ${request.url()}`);
+  });
   await page.goto(own + hash);
   return { page, complaints };
 }
@@ -58,10 +82,18 @@ export async function close(page) {
 /** Open the page of a basis, wait until it is drawn and its texts, which move the picture, are written, and show all
  * controls. By default the patient is supine and
  * does not breathe, as tests point at fixed places in the picture. */
-export async function openLungs(path, options, hash = '#posture=supine&depth=500&show=contours&room=0&colour=displacement') {
+export async function openLungs(
+  path,
+  options,
+  hash = '#posture=supine&depth=500&show=contours&room=0&colour=displacement',
+) {
   const opened = await open(path, options, hash);
-  await opened.page.waitForFunction(() => window.supine?.panes().length > 0 && document.getElementById('finding').textContent);
-  await opened.page.evaluate(() => { document.getElementById('more').open = true; });
+  await opened.page.waitForFunction(
+    () => window.supine?.panes().length > 0 && document.getElementById('finding').textContent,
+  );
+  await opened.page.evaluate(() => {
+    document.getElementById('more').open = true;
+  });
   return opened;
 }
 
@@ -86,7 +118,10 @@ export async function press(page, key) {
 }
 
 /** Return the picture without the texts over it. */
-const screenshot = (page) => page.locator('#picture').screenshot({ style: '#stage > :not(#picture):not(#notes) { visibility: hidden !important }' });
+const screenshot = (page) =>
+  page
+    .locator('#picture')
+    .screenshot({ style: '#stage > :not(#picture):not(#notes) { visibility: hidden !important }' });
 
 /** Return the picture after it has been drawn and no longer changes. */
 export async function picture(page) {
@@ -110,4 +145,10 @@ export async function assertPicture(page, before, message, equal = true) {
 }
 
 /** Wait until a change is drawn. */
-export const settled = (page) => page.evaluate(() => new Promise((done) => { requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done))); }));
+export const settled = (page) =>
+  page.evaluate(
+    () =>
+      new Promise((done) => {
+        requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)));
+      }),
+  );

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the colour maps of pages, pictures and reports: perceptual steps are even, lightness increases, and ranges end at
-// round numbers.
+// Test the colour maps of pages, pictures and reports: perceptual steps are even, lightness increases, and ranges end
+// at round numbers.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -18,7 +18,9 @@ const { tickStep, rangeEnd } = new Function(`${code}
 
 /** Return the OKLab colour of sRGB bytes. */
 function oklab(bytes) {
-  const [r, g, b] = Array.from(bytes, (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+  const [r, g, b] = Array.from(bytes, (x) =>
+    x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4,
+  );
   const l = Math.cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
   const m = Math.cbrt(0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b);
   const s = Math.cbrt(0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b);
@@ -46,16 +48,31 @@ for (const name of ['displacement', 'difference']) {
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-const apart = (hex, name, i) => Math.max(...bytesOf(hex).map((x, k) => Math.abs(x - Buffer.from(colours[name], 'hex')[3 * i + k])));
+const apart = (hex, name, i) =>
+  Math.max(...bytesOf(hex).map((x, k) => Math.abs(x - Buffer.from(colours[name], 'hex')[3 * i + k])));
 const bars = [...report.matchAll(/linear-gradient\(90deg,(#[^)]*)\)/g)].map((found) => found[1].split(','));
 assert.equal(bars.length, 1);
 for (const stops of bars) {
   assert.equal(stops.length, 17);
-  const off = Object.keys(colours).map((name) => Math.max(...stops.map((hex, i) => apart(hex, name, Math.round((255 * i) / 16)))));
+  const off = Object.keys(colours).map((name) =>
+    Math.max(...stops.map((hex, i) => apart(hex, name, Math.round((255 * i) / 16)))),
+  );
   assert.ok(Math.min(...off) <= 3, `colours of a bar differ by ${off}: ${stops}`);
 }
 
-// Ranges end at the same round numbers as those of pictures and reports: the cases are from tests/program/test_render.c.
-for (const [value, step, end] of [[31.6, 5, 35], [18.7, 2, 20], [20, 5, 20], [0.043, 0.01, 0.05], [7.99, 1, 8], [8, 2, 8], [0, 0.2, 1]]) {
-  assert.ok(Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12, `${value}: ${tickStep(value)}, ${rangeEnd(value)}`);
+// Ranges end at the same round numbers as those of pictures and reports: the cases are from
+// tests/program/test_render.c.
+for (const [value, step, end] of [
+  [31.6, 5, 35],
+  [18.7, 2, 20],
+  [20, 5, 20],
+  [0.043, 0.01, 0.05],
+  [7.99, 1, 8],
+  [8, 2, 8],
+  [0, 0.2, 1],
+]) {
+  assert.ok(
+    Math.abs(tickStep(value) - step) < 1e-12 && Math.abs(rangeEnd(value) - end) < 1e-12,
+    `${value}: ${tickStep(value)}, ${rangeEnd(value)}`,
+  );
 }

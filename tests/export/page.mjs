@@ -15,7 +15,10 @@ async function checkPositions(page, basis, volume) {
   const [{ xyz: rest }, ...truth] = await evaluateFor(page, basis, [[[0, 1, 0], 0], ...pairs]);
   let worst = 0;
   for (const [i, [g, mL]] of pairs.entries()) {
-    const found = await page.evaluate(([gravity, depth]) => Array.from(window.supine.positions(gravity, depth)), [g, mL]);
+    const found = await page.evaluate(
+      ([gravity, depth]) => Array.from(window.supine.positions(gravity, depth)),
+      [g, mL],
+    );
     worst = Math.max(worst, largestDistance(found, truth[i].xyz));
     assert.ok(largestDistance(found, rest) > 0.5, 'the lungs did not move, so nothing was tested');
   }
@@ -52,7 +55,9 @@ async function checkControls(page) {
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'upright');
   await changes('difference', () => page.locator('[name=kind][value=difference]').check({ force: true }));
   await changes('pinning', () => page.getByRole('button', { name: 'Use as the other posture' }).click());
-  await changes('another key', () => press(page, '3')); /* left side, because the room changes nothing in the picture of an upright patient */
+  await changes('another key', () =>
+    press(page, '3'),
+  ); /* left side, because the room changes nothing in the picture of an upright patient */
   await changes('room', async () => {
     await page.locator('[name=frame][value=room]').check({ force: true });
     await page.waitForFunction(() => window.supine.state.roomBlend > 0.99);
@@ -71,7 +76,12 @@ async function checkControls(page) {
 /** Check that the value at the pointer is within the range of displacements on the surface. */
 async function checkPointer(page) {
   const box = await page.locator('#picture').boundingBox();
-  for (const [x, y] of [[0.36, 0.5], [0.4, 0.45], [0.62, 0.5], [0.3, 0.5]]) {
+  for (const [x, y] of [
+    [0.36, 0.5],
+    [0.4, 0.45],
+    [0.62, 0.5],
+    [0.3, 0.5],
+  ]) {
     await page.mouse.move(box.x + box.width * x, box.y + box.height * y);
     await settled(page);
     await page.waitForFunction(() => !window.supine.picture.picking);
@@ -82,7 +92,8 @@ async function checkPointer(page) {
         const { gravity, depth } = window.supine.state;
         const [rest, moved] = [window.supine.positions(gravity, 0), window.supine.positions(gravity, depth)];
         const lengths = [];
-        for (let i = 0; i < rest.length; i += 3) lengths.push(Math.hypot(moved[i] - rest[i], moved[i + 1] - rest[i + 1], moved[i + 2] - rest[i + 2]));
+        for (let i = 0; i < rest.length; i += 3)
+          lengths.push(Math.hypot(moved[i] - rest[i], moved[i + 1] - rest[i + 1], moved[i + 2] - rest[i + 2]));
         return [Math.min(...lengths), Math.max(...lengths)];
       });
       assert.ok(value >= low - 0.01 && value <= high + 0.01, `${value} is not within ${low} and ${high}`);
@@ -115,4 +126,3 @@ await checkPositions(dark.page, bases[1], 700);
 assert.ok(await dark.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'too wide for a phone');
 assert.deepEqual(dark.complaints, []);
 await close(dark.page);
-

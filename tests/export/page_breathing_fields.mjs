@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A page of another simulator's fields over gravity and volume, stored as modes and as clusters: positions, on the graphics
-// card and in the script, and volumes are those of the library; clusters stay clusters, so that the page is smaller; the two lungs open differently, the volume and the breath have their sliders, and a volume that
-// was not simulated is replaced by the nearest.
+// A page of another simulator's fields over gravity and volume, stored as modes and as clusters: positions, on the
+// graphics card and in the script, and volumes are those of the library; clusters stay clusters, so that the page is
+// smaller; the two lungs open differently, the volume and the breath have their sliders, and a volume that was not
+// simulated is replaced by the nearest.
 import assert from 'node:assert/strict';
 import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,8 +10,24 @@ import { close, evaluateFor, openLungs, settled } from './browser.mjs';
 import { breathingFieldsBasis, deformed, floatsOf, folder, largestDistance, supine } from './support.mjs';
 
 const TOLERANCE_MM = 0.02;
-const [html, simplified, points, inside, rows] = ['breathing.html', 'breathing-simplified.html', 'breathing.csv', 'breathing-inside.safetensors', 'breathing-moved.csv'].map((name) => join(folder, name));
-const states = [[[0, 1, 0], 300], [[0, -1, 0], 1200], [[1, 0, 0], 700], [[0, 0, -1], 1700], [[0.48, -0.6, 0.64], 950], [[-0.8, 0.36, 0.48], 150], [[-0.6, -0.64, -0.48], 1450], [[0, 1, 0], 0], [[1, 0, 0], 0]];
+const [html, simplified, points, inside, rows] = [
+  'breathing.html',
+  'breathing-simplified.html',
+  'breathing.csv',
+  'breathing-inside.safetensors',
+  'breathing-moved.csv',
+].map((name) => join(folder, name));
+const states = [
+  [[0, 1, 0], 300],
+  [[0, -1, 0], 1200],
+  [[1, 0, 0], 700],
+  [[0, 0, -1], 1700],
+  [[0.48, -0.6, 0.64], 950],
+  [[-0.8, 0.36, 0.48], 150],
+  [[-0.6, -0.64, -0.48], 1450],
+  [[0, 1, 0], 0],
+  [[1, 0, 0], 0],
+];
 const sizes = {};
 for (const storage of ['modes', 'clusters']) {
   const basis = join(folder, `breathing-${storage}.safetensors`);
@@ -23,13 +40,23 @@ for (const storage of ['modes', 'clusters']) {
   supine('export', basis, '--inside', inside, '-o', html);
   const { page, complaints } = await openLungs(html);
   const truth = await evaluateFor(page, basis, states);
-  const moments = await page.evaluate((all) => all.map(([g, ml]) => ({ ...window.supine.moment(g, ml), at: Array.from(window.supine.positions(g, ml)) })), states);
+  const moments = await page.evaluate(
+    (all) => all.map(([g, ml]) => ({ ...window.supine.moment(g, ml), at: Array.from(window.supine.positions(g, ml)) })),
+    states,
+  );
   let worst = 0;
-  moments.forEach(({ at }, i) => { worst = Math.max(worst, largestDistance(at, truth[i].xyz)); });
+  moments.forEach(({ at }, i) => {
+    worst = Math.max(worst, largestDistance(at, truth[i].xyz));
+  });
   console.log(`${storage}: ${worst.toExponential(2)} mm off in ${states.length} states`);
   assert.ok(worst < TOLERANCE_MM, `${worst} mm`);
-  const scripted = await page.evaluate((all) => all.map(([g, ml]) => Array.from(window.supine.placesOf(window.supine.basis, window.supine.moment(g, ml)))), states);
-  scripted.forEach((at, i) => assert.ok(largestDistance(at, truth[i].xyz) < TOLERANCE_MM, `${states[i]}: the script errs`));
+  const scripted = await page.evaluate(
+    (all) => all.map(([g, ml]) => Array.from(window.supine.placesOf(window.supine.basis, window.supine.moment(g, ml)))),
+    states,
+  );
+  scripted.forEach((at, i) =>
+    assert.ok(largestDistance(at, truth[i].xyz) < TOLERANCE_MM, `${states[i]}: the script errs`),
+  );
 
   // A page of clusters has no coefficients of vertices. The vertices that have arrows move like the others.
   assert.equal(await page.evaluate(() => window.supine.basis.counts === undefined), storage === 'clusters');
@@ -38,27 +65,48 @@ for (const storage of ['modes', 'clusters']) {
     const { picture, moment } = window.supine;
     const target = picture.buffer(16 * picture.fewCount, picture.gl.DYNAMIC_READ);
     picture.capture(moment(g, ml), picture.fewInputs, target);
-    return { every: Math.floor(picture.basis.vertices / picture.fewCount), at: Array.from(picture.take(target, picture.fewCount)) };
+    return {
+      every: Math.floor(picture.basis.vertices / picture.fewCount),
+      at: Array.from(picture.take(target, picture.fewCount)),
+    };
   }, states[4]);
   assert.ok(few.every > 1 && few.at.length / 3 > 400);
-  assert.ok(largestDistance(few.at, moments[4].at.filter((_, i) => Math.floor(i / 3) % few.every === 0)) < 1e-4);
+  assert.ok(
+    largestDistance(
+      few.at,
+      moments[4].at.filter((_, i) => Math.floor(i / 3) % few.every === 0),
+    ) < 1e-4,
+  );
 
   // A vertex that a simplified page keeps stays where it was.
   supine('export', basis, '--simplify', '700', '-o', simplified);
   const part = await openLungs(simplified);
   assert.ok(await part.page.evaluate(() => window.supine.basis.vertices < 800));
-  const [moved700] = await part.page.evaluate((all) => all.map(([g, ml]) => Array.from(window.supine.positions(g, ml))), [states[4]]);
+  const [moved700] = await part.page.evaluate(
+    (all) => all.map(([g, ml]) => Array.from(window.supine.positions(g, ml))),
+    [states[4]],
+  );
   for (let i = 0; i < moved700.length; i += 3) {
     let nearest = Infinity; // a vertex that is kept stays where it was
-    for (let j = 0; j < moments[4].at.length; j += 3) nearest = Math.min(nearest, Math.hypot(...[0, 1, 2].map((axis) => moved700[i + axis] - moments[4].at[j + axis])));
+    for (let j = 0; j < moments[4].at.length; j += 3)
+      nearest = Math.min(nearest, Math.hypot(...[0, 1, 2].map((axis) => moved700[i + axis] - moments[4].at[j + axis])));
     assert.ok(nearest < 1e-3, `vertex ${i / 3} of the simplified page is ${nearest} mm off`);
   }
   assert.deepEqual(part.complaints, []);
   await close(part.page);
-  assert.ok(states.every((_, i) => i === 0 || largestDistance(truth[i].xyz, truth[0].xyz) > 2), 'the states are alike');
+  assert.ok(
+    states.every((_, i) => i === 0 || largestDistance(truth[i].xyz, truth[0].xyz) > 2),
+    'the states are alike',
+  );
 
   // Where a volume begins to differ from that of the scan, the lungs do not jump.
-  const jump = await page.evaluate((postures) => postures.map((g) => [0, 0.01].map((ml) => Array.from(window.supine.positions(g, ml)))), [[0, 1, 0], [1, 0, 0]]);
+  const jump = await page.evaluate(
+    (postures) => postures.map((g) => [0, 0.01].map((ml) => Array.from(window.supine.positions(g, ml)))),
+    [
+      [0, 1, 0],
+      [1, 0, 0],
+    ],
+  );
   for (const [at, near] of jump) assert.ok(largestDistance(at, near) < 0.005, 'a jump');
 
   // The lungs hold the volume that is asked, and share it as 'deform' does: the right lung lags behind.
@@ -70,26 +118,62 @@ for (const storage of ['modes', 'clusters']) {
 
   // The weights of each lung also move structures inside it. Points that were given on the surface stay on it.
   supine('deform', inside, '--gravity', states[4][0].join(), '--volume', `scan+${states[4][1]}`, '-o', rows);
-  const [columns, ...parts] = readFileSync(rows, 'utf8').trim().split('\n').filter((line) => !line.startsWith('#')).map((line) => line.split(','));
+  const [columns, ...parts] = readFileSync(rows, 'utf8')
+    .trim()
+    .split('\n')
+    .filter((line) => !line.startsWith('#'))
+    .map((line) => line.split(','));
   const moved = deformed(basis, '--gravity', states[4][0].join(), '--volume', `scan+${states[4][1]}`);
-  parts.forEach((row, i) => assert.ok(largestDistance(moved.subarray(3 * chosen[i][0], 3 * chosen[i][0] + 3), ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)]))) < TOLERANCE_MM, `${row}`));
+  parts.forEach((row, i) =>
+    assert.ok(
+      largestDistance(
+        moved.subarray(3 * chosen[i][0], 3 * chosen[i][0] + 3),
+        ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)])),
+      ) < TOLERANCE_MM,
+      `${row}`,
+    ),
+  );
   const within = await page.evaluate(([g, ml]) => Array.from(window.supine.insidePositions(g, ml)), states[4]);
-  parts.forEach((row, i) => assert.ok(largestDistance(within.slice(3 * i, 3 * i + 3), ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)]))) < TOLERANCE_MM, `${row}`));
+  parts.forEach((row, i) =>
+    assert.ok(
+      largestDistance(
+        within.slice(3 * i, 3 * i + 3),
+        ['x', 'y', 'z'].map((axis) => Number(row[columns.indexOf(axis)])),
+      ) < TOLERANCE_MM,
+      `${row}`,
+    ),
+  );
 
   // The slider has the range that was simulated, and a breath stays within what all postures can hold.
   assert.ok(await page.locator('#depth').isVisible());
-  const sliders = await page.evaluate(() => { const { depthMin, depthMax, shared, tidal, expired } = window.supine.state; return { depthMin, depthMax, shared, tidal, expired }; });
+  const sliders = await page.evaluate(() => {
+    const { depthMin, depthMax, shared, tidal, expired } = window.supine.state;
+    return { depthMin, depthMax, shared, tidal, expired };
+  });
   assert.ok(sliders.depthMin < 0 && sliders.depthMax > 1700 && sliders.tidal === 500, JSON.stringify(sliders));
-  assert.ok(sliders.expired >= sliders.shared[0] && sliders.expired + sliders.tidal <= sliders.shared[1], JSON.stringify(sliders));
+  assert.ok(
+    sliders.expired >= sliders.shared[0] && sliders.expired + sliders.tidal <= sliders.shared[1],
+    JSON.stringify(sliders),
+  );
   const limited = await page.evaluate(() => window.supine.moment([0, -1, 0], 9000));
   assert.equal(limited.above, limited.limited[1]);
-  await page.evaluate(() => { location.hash = 'posture=prone&depth=900&room=0'; });
+  await page.evaluate(() => {
+    location.hash = 'posture=prone&depth=900&room=0';
+  });
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'prone');
   await settled(page);
   assert.match(await page.locator('#finding').textContent(), /^Prone, 900 mL above the scan, /);
-  const before = await page.evaluate(() => Array.from(window.supine.state.moment.frames ?? window.supine.state.moment.weights));
+  const before = await page.evaluate(() =>
+    Array.from(window.supine.state.moment.frames ?? window.supine.state.moment.weights),
+  );
   await page.locator('#play').click();
-  await page.waitForFunction((weights) => weights.some((w, i) => Math.abs(w - (window.supine.state.moment.frames ?? window.supine.state.moment.weights)[i]) > 1e-4), before);
+  await page.waitForFunction(
+    (weights) =>
+      weights.some(
+        (w, i) => Math.abs(w - (window.supine.state.moment.frames ?? window.supine.state.moment.weights)[i]) > 1e-4,
+      ),
+    before,
+  );
   assert.ok(await page.evaluate(() => window.supine.state.playing && window.supine.state.moment.limited === null));
   await page.locator('#play').click();
   assert.deepEqual(complaints, []);

@@ -9,25 +9,45 @@ import { html } from './lungs.mjs';
 
 const emulator = join(process.env.MODULES, 'node_modules/iwer/build/iwer.min.js');
 if (existsSync(emulator)) {
-  const { page, complaints } = await openLungs(html, { viewport: { width: 760, height: 480 }, init: { content: `${readFileSync(emulator, 'utf8')}
+  const { page, complaints } = await openLungs(
+    html,
+    {
+      viewport: { width: 760, height: 480 },
+      init: {
+        content: `${readFileSync(emulator, 'utf8')}
     window.headset = new IWER.XRDevice(IWER.metaQuest3);
-    window.headset.installRuntime({ forceInstall: true });` } }, '#posture=supine');
+    window.headset.installRuntime({ forceInstall: true });`,
+      },
+    },
+    '#posture=supine',
+  );
   await page.locator('#ar:not([hidden])').waitFor();
   await page.evaluate(() => {
-    const { headset, supine: { picture } } = window;
+    const {
+      headset,
+      supine: { picture },
+    } = window;
     headset.position.set(0, 1.5, 0);
     headset.controllers.left.connected = false;
     const draw = picture.draw.bind(picture);
-    picture.draw = (panes, framebuffer) => { window.drawn = panes; draw(panes, framebuffer); };
+    picture.draw = (panes, framebuffer) => {
+      window.drawn = panes;
+      draw(panes, framebuffer);
+    };
   });
   /** Put the controller on the breastbone; the columns of the rotation are its right, upper and backward directions. */
-  const put = (q, place) => page.evaluate(([quaternion, at]) => {
-    const { position, quaternion: turn } = window.headset.controllers.right;
-    position.set(...at);
-    turn.set(...quaternion);
-  }, [q, place]);
+  const put = (q, place) =>
+    page.evaluate(
+      ([quaternion, at]) => {
+        const { position, quaternion: turn } = window.headset.controllers.right;
+        position.set(...at);
+        turn.set(...quaternion);
+      },
+      [q, place],
+    );
   const gravity = async (wanted, what) => {
-    await page.waitForFunction((g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 0.02, wanted)
+    await page
+      .waitForFunction((g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 0.02, wanted)
       .catch(async () => assert.fail(`${what}: ${await page.evaluate(() => window.supine.state.moment.gravity)}`));
   };
   const h = Math.SQRT1_2;
@@ -46,7 +66,9 @@ if (existsSync(emulator)) {
 
   /* The lungs are within 25 cm of the controller, and behind it as seen from the front. */
   const [near, behind] = await page.evaluate(() => {
-    const { basis: { torso } } = window.supine;
+    const {
+      basis: { torso },
+    } = window.supine;
     const m = window.drawn[0].toEye;
     const eye = [0, 1, 2].map((i) => m[12 + i] + torso.centre.reduce((sum, x, k) => sum + m[4 * k + i] * x, 0));
     const [x, y, z] = [0.2, 1.1 - 1.5, -0.6]; // the controller, seen from the head

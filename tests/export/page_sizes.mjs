@@ -11,11 +11,31 @@ import { pictureFolder } from './support.mjs';
 
 const pictures = pictureFolder('page_sizes');
 
-for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]]) {
+for (const [width, height] of [
+  [1400, 900],
+  [900, 600],
+  [844, 390],
+  [390, 844],
+]) {
   const touch = Math.min(width, height) < 400;
-  const { page, complaints } = await openLungs(html, { viewport: { width, height }, ...(touch && { hasTouch: true }) }, '#posture=left');
-  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth && [...document.querySelectorAll('#panel button, #panel input')].every((e) => { const b = e.getBoundingClientRect(); return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5); })), `${width} x ${height}: something is cut`);
-  if (touch) { // a tap marks a point of the picture, and does not turn the camera
+  const { page, complaints } = await openLungs(
+    html,
+    { viewport: { width, height }, ...(touch && { hasTouch: true }) },
+    '#posture=left',
+  );
+  assert.ok(
+    await page.evaluate(
+      () =>
+        document.documentElement.scrollWidth <= innerWidth &&
+        [...document.querySelectorAll('#panel button, #panel input')].every((e) => {
+          const b = e.getBoundingClientRect();
+          return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5);
+        }),
+    ),
+    `${width} x ${height}: something is cut`,
+  );
+  if (touch) {
+    // a tap marks a point of the picture, and does not turn the camera
     const box = await page.locator('#picture').boundingBox();
     const azimuth = await page.evaluate(() => window.supine.state.camera.azimuth);
     await page.touchscreen.tap(box.x + box.width * 0.48, box.y + box.height * 0.36);
@@ -27,7 +47,10 @@ for (const [width, height] of [[1400, 900], [900, 600], [844, 390], [390, 844]])
     await press(page, key);
     await settled(page);
     const { y, height: tall } = await page.locator('#postures').boundingBox();
-    assert.ok(!cards || (Math.abs(y - cards.y) < 60 && tall === cards.tall), `${width} x ${height}, posture ${key}: the cards move`);
+    assert.ok(
+      !cards || (Math.abs(y - cards.y) < 60 && tall === cards.tall),
+      `${width} x ${height}, posture ${key}: the cards move`,
+    );
     cards = { y, tall };
   }
   for (const theme of ['light', 'dark']) {

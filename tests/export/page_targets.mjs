@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Thirty targets at random places have the same displacement and expected error in `deform`, in the table of `compare`, in
-// the report, on the page, also of a simplified surface, and in pictures. The printed report of thirty targets, with long
-// names and other scripts, has every number on the paper, in letters of a legible size.
+// Thirty targets at random places have the same displacement and expected error in `deform`, in the table of `compare`,
+// in the report, on the page, also of a simplified surface, and in pictures. The printed report of thirty targets, with
+// long names and other scripts, has every number on the paper, in letters of a legible size.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -13,43 +13,82 @@ import { folder, randomSource, supine } from './support.mjs';
 const COUNT = 30;
 const ROUNDED_MM = 0.051; // tolerance: numbers have one decimal
 const WRITTEN_MM = 0.071; // of the page, which also stores 16-bit numbers
-const SMALLEST_PT = 7;    // height of printed letters, with the space above and below
+const SMALLEST_PT = 7; // height of printed letters, with the space above and below
 const POSTURES = ['prone', 'right', '0.48:-0.60:0.64'];
-const [points, inside, html, small, report, table, moved, pdf] = ['thirty.csv', 'thirty.safetensors', 'thirty.html', 'small.html', 'thirty-report.html', 'thirty-table.csv', 'thirty-moved.csv', 'thirty.pdf'].map((name) => join(folder, name));
+const [points, inside, html, small, report, table, moved, pdf] = [
+  'thirty.csv',
+  'thirty.safetensors',
+  'thirty.html',
+  'small.html',
+  'thirty-report.html',
+  'thirty-table.csv',
+  'thirty-moved.csv',
+  'thirty.pdf',
+].map((name) => join(folder, name));
 
 const random = randomSource(1907);
-const long = ['Right lower lobe superior segment part-solid nodule of the screening CT of March, named in full by someone who wanted to be understood ok', 'ورم في الفص السفلي الأيمن', 'Tumor im rechten Unterlappenü'];
+const long = [
+  'Right lower lobe superior segment part-solid nodule of the screening CT of March, named in full ' +
+    'by someone who wanted to be understood ok',
+  'ورم في الفص السفلي الأيمن',
+  'Tumor im rechten Unterlappenü',
+];
 const names = Array.from({ length: COUNT }, (_, i) => long[i] ?? `nodule ${i + 1}`);
-const places = names.map((_, i) => [(i % 2 ? 70 : -80) + 40 * (random() - 0.5), -120 + 80 * (random() - 0.5), -110 + 120 * (random() - 0.5)].map((x) => x.toFixed(1)));
+const places = names.map((_, i) =>
+  [(i % 2 ? 70 : -80) + 40 * (random() - 0.5), -120 + 80 * (random() - 0.5), -110 + 120 * (random() - 0.5)].map((x) =>
+    x.toFixed(1),
+  ),
+);
 writeFileSync(points, `name,x,y,z\n${names.map((name, i) => `"${name}",${places[i]}\n`).join('')}`);
 supine('embed', basis, points, '-o', inside);
 
-const split = (line) => [...line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)].map(([, quoted, bare]) => quoted?.replaceAll('""', '"') ?? bare);
+const split = (line) =>
+  [...line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)].map(
+    ([, quoted, bare]) => quoted?.replaceAll('""', '"') ?? bare,
+  );
 /** Read a CSV file with a header as a list of objects. */
 function readTable(path) {
-  const [header, ...rows] = readFileSync(path, 'utf8').trim().split('\n').filter((line) => !line.startsWith('#')).map(split);
+  const [header, ...rows] = readFileSync(path, 'utf8')
+    .trim()
+    .split('\n')
+    .filter((line) => !line.startsWith('#'))
+    .map(split);
   return rows.map((row) => Object.fromEntries(header.map((name, i) => [name, row[i]])));
 }
 const near = (a, b, tolerance, what) => assert.ok(Math.abs(a - b) <= tolerance, `${what}: ${a} and ${b}`);
 
 /* The numbers of `deform`. */
-const truth = Object.fromEntries(POSTURES.map((posture) => {
-  supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', 'supine:rest', '-o', moved);
-  return [posture, readTable(moved)];
-}));
+const truth = Object.fromEntries(
+  POSTURES.map((posture) => {
+    supine('deform', inside, '--posture', posture, '--volume', 'rest', '--from', 'supine:rest', '-o', moved);
+    return [posture, readTable(moved)];
+  }),
+);
 
 /* The table and the JSON of `compare`. */
 supine('compare', basis, '--inside', inside, '--postures', POSTURES.join(','), '-o', table);
 const rows = readTable(table);
 assert.ok(rows.every(({ schema, from }) => schema === '1' && from === 'supine at rest'));
-const json = JSON.parse(supine('compare', basis, '--inside', inside, '--postures', POSTURES.join(','), '--json').replace(/^[^{]*/, ''));
+const json = JSON.parse(
+  supine('compare', basis, '--inside', inside, '--postures', POSTURES.join(','), '--json').replace(/^[^{]*/, ''),
+);
 assert.equal(json.schema, 1);
 POSTURES.forEach((posture, p) => {
   const own = rows.filter((row) => row.posture === posture);
   const targets = own.filter(({ kind }) => kind === 'target');
-  assert.deepEqual(targets.map(({ name }) => name), names);
+  assert.deepEqual(
+    targets.map(({ name }) => name),
+    names,
+  );
   truth[posture].forEach((row, i) => {
-    for (const [column, other] of [['mm', 'moved_mm'], ['dx', 'dx'], ['dy', 'dy'], ['dz', 'dz'], ['expected_error_mm', 'expected_error_mm']]) near(targets[i][column], row[other], 0.0011, `${posture}, ${row.name}, ${column}: table and deform`);
+    for (const [column, other] of [
+      ['mm', 'moved_mm'],
+      ['dx', 'dx'],
+      ['dy', 'dy'],
+      ['dz', 'dz'],
+      ['expected_error_mm', 'expected_error_mm'],
+    ])
+      near(targets[i][column], row[other], 0.0011, `${posture}, ${row.name}, ${column}: table and deform`);
   });
   const { displacement_mm: mm, volume_ml: ml, expected_error_mm: error, gravity } = json.postures[p];
   const [surface] = own.filter(({ kind }) => kind === 'surface');
@@ -57,33 +96,57 @@ POSTURES.forEach((posture, p) => {
   near(surface.max_mm, mm.max, 0.0006, `${posture}: largest of the surface`);
   near(surface.expected_error_mm, error, 0.0006, `${posture}: error of the surface`);
   ['gx', 'gy', 'gz'].forEach((column, axis) => near(surface[column], gravity[axis], 1e-6, column));
-  for (const { name, volume_ml: held } of own.filter(({ kind }) => kind === 'lung')) near(held, ml[name].value, 0.0006, `${posture}: ${name} lung`);
+  for (const { name, volume_ml: held } of own.filter(({ kind }) => kind === 'lung'))
+    near(held, ml[name].value, 0.0006, `${posture}: ${name} lung`);
 });
 
 /* The report, and its print. */
 supine('compare', basis, '--inside', inside, '--postures', POSTURES.join(','), '-o', report);
 const { page, complaints } = await open(report);
-const matrix = await page.evaluate(() => [...document.querySelectorAll('table.matrix tbody tr')].map((row) => [...row.cells].map((cell) => cell.firstChild.textContent.trim())));
-assert.deepEqual(matrix.map(([name]) => name), names);
-matrix.forEach(([name, ...cells], i) => cells.forEach((cell, p) => {
-  const [mm, error] = cell.split(' \u00b1 ').map(Number);
-  near(mm, truth[POSTURES[p]][i].moved_mm, ROUNDED_MM, `${name}, ${POSTURES[p]}: report and deform`);
-  near(error, truth[POSTURES[p]][i].expected_error_mm, ROUNDED_MM, `${name}, ${POSTURES[p]}: error of report and deform`);
-}));
+const matrix = await page.evaluate(() =>
+  [...document.querySelectorAll('table.matrix tbody tr')].map((row) =>
+    [...row.cells].map((cell) => cell.firstChild.textContent.trim()),
+  ),
+);
+assert.deepEqual(
+  matrix.map(([name]) => name),
+  names,
+);
+matrix.forEach(([name, ...cells], i) =>
+  cells.forEach((cell, p) => {
+    const [mm, error] = cell.split(' \u00b1 ').map(Number);
+    near(mm, truth[POSTURES[p]][i].moved_mm, ROUNDED_MM, `${name}, ${POSTURES[p]}: report and deform`);
+    near(
+      error,
+      truth[POSTURES[p]][i].expected_error_mm,
+      ROUNDED_MM,
+      `${name}, ${POSTURES[p]}: error of report and deform`,
+    );
+  }),
+);
 await page.pdf({ path: pdf, format: 'A4', printBackground: true });
 const sheets = execFileSync('pdftotext', ['-bbox', pdf, '-'], { encoding: 'utf8' }).split('<page ').slice(1);
 const printed = [];
 sheets.forEach((sheet, s) => {
   const [, width, height] = /width="([\d.]+)" height="([\d.]+)"/.exec(sheet).map(Number);
-  for (const [, ...found] of sheet.matchAll(/<word xMin="([-\d.]+)" yMin="([-\d.]+)" xMax="([-\d.]+)" yMax="([-\d.]+)">([^<]*)/g)) {
+  for (const [, ...found] of sheet.matchAll(
+    /<word xMin="([-\d.]+)" yMin="([-\d.]+)" xMax="([-\d.]+)" yMax="([-\d.]+)">([^<]*)/g,
+  )) {
     const [x, y, right, bottom] = found.slice(0, 4).map(Number);
-    assert.ok(x >= 20 && right <= width - 20 && y >= 15 && bottom <= height - 10, `sheet ${s + 1}: '${found[4]}' is cut: ${[x, y, right, bottom]} of ${width} x ${height}`);
-    if (!/^[LRAPHF]$/.test(found[4])) assert.ok(bottom - y >= SMALLEST_PT, `sheet ${s + 1}: '${found[4]}' is ${bottom - y} pt high`);
+    assert.ok(
+      x >= 20 && right <= width - 20 && y >= 15 && bottom <= height - 10,
+      `sheet ${s + 1}: '${found[4]}' is cut: ${[x, y, right, bottom]} of ${width} x ${height}`,
+    );
+    if (!/^[LRAPHF]$/.test(found[4]))
+      assert.ok(bottom - y >= SMALLEST_PT, `sheet ${s + 1}: '${found[4]}' is ${bottom - y} pt high`);
     printed.push(found[4]);
   }
 });
-for (const [, ...cells] of matrix) for (const number of cells.flatMap((cell) => cell.split(' \u00b1 '))) assert.ok(printed.includes(number), `${number} is not printed`);
-for (const word of long.flatMap((name) => name.split(' ')).filter((name) => /^[\w,-]{2,}$/.test(name))) assert.ok(printed.join('').includes(word), `'${word}' is not printed`);
+for (const [, ...cells] of matrix)
+  for (const number of cells.flatMap((cell) => cell.split(' \u00b1 ')))
+    assert.ok(printed.includes(number), `${number} is not printed`);
+for (const word of long.flatMap((name) => name.split(' ')).filter((name) => /^[\w,-]{2,}$/.test(name)))
+  assert.ok(printed.join('').includes(word), `'${word}' is not printed`);
 assert.deepEqual(complaints, []);
 await close(page);
 
@@ -93,14 +156,26 @@ supine('export', basis, '--inside', inside, '-o', small, '--simplify', '500');
 for (const path of [html, small]) {
   const { page: lungs, complaints: said } = await openLungs(path, {}, '');
   for (const posture of POSTURES) {
-    await lungs.evaluate((text) => { location.hash = `posture=${text}&depth=0`; }, posture);
+    await lungs.evaluate((text) => {
+      location.hash = `posture=${text}&depth=0`;
+    }, posture);
     await lungs.waitForFunction((text) => document.getElementById('posture-name').value === text, posture);
     await settled(lungs);
-    const shown = await lungs.evaluate(() => [...document.querySelectorAll('#inside-rows tr')].map((row) => [...row.cells].map((cell) => cell.textContent)));
-    assert.deepEqual(shown.map(([name]) => name), names);
+    const shown = await lungs.evaluate(() =>
+      [...document.querySelectorAll('#inside-rows tr')].map((row) => [...row.cells].map((cell) => cell.textContent)),
+    );
+    assert.deepEqual(
+      shown.map(([name]) => name),
+      names,
+    );
     shown.forEach(([name, mm, , error], i) => {
       near(parseFloat(mm), truth[posture][i].moved_mm, WRITTEN_MM, `${name}, ${posture}: page and deform`);
-      near(parseFloat(error), truth[posture][i].expected_error_mm, WRITTEN_MM, `${name}, ${posture}: error of page and deform`);
+      near(
+        parseFloat(error),
+        truth[posture][i].expected_error_mm,
+        WRITTEN_MM,
+        `${name}, ${posture}: error of page and deform`,
+      );
     });
   }
   assert.deepEqual(said, []);
@@ -109,10 +184,22 @@ for (const path of [html, small]) {
 
 /* Pictures: the caption tells of the target that moves farthest in multiples of its error. */
 supine('render', basis, '--inside', inside, '--posture', 'prone:rest', '--from', 'supine:rest', '-o', pdf);
-const first = truth.prone.reduce((most, row) => (row.moved_mm / row.expected_error_mm > most.moved_mm / most.expected_error_mm ? row : most));
-const [, who, way, error] = /(\S.*): (\d+ to the .*)\nexpected error ([\d.]+) mm/.exec(execFileSync('pdftotext', [pdf, '-'], { encoding: 'utf8' }));
+const first = truth.prone.reduce((most, row) =>
+  row.moved_mm / row.expected_error_mm > most.moved_mm / most.expected_error_mm ? row : most,
+);
+const [, who, way, error] = /(\S.*): (\d+ to the .*)\nexpected error ([\d.]+) mm/.exec(
+  execFileSync('pdftotext', [pdf, '-'], { encoding: 'utf8' }),
+);
 assert.ok(first.name.startsWith(who.replace(/\W*$/, '')), `${who}, not ${first.name}`);
 near(error, first.expected_error_mm, ROUNDED_MM, `${who}: error of picture and deform`);
-const AXES = { left: ['dx', 1], right: ['dx', -1], back: ['dy', 1], front: ['dy', -1], head: ['dz', 1], feet: ['dz', -1] };
-for (const [, mm, to] of way.matchAll(/(\d+) to the (\w+)/g)) near(mm, AXES[to][1] * first[AXES[to][0]], 0.51, `${who}: ${way}`);
+const AXES = {
+  left: ['dx', 1],
+  right: ['dx', -1],
+  back: ['dy', 1],
+  front: ['dy', -1],
+  head: ['dz', 1],
+  feet: ['dz', -1],
+};
+for (const [, mm, to] of way.matchAll(/(\d+) to the (\w+)/g))
+  near(mm, AXES[to][1] * first[AXES[to][0]], 0.51, `${who}: ${way}`);
 console.log(`targets: ${COUNT} in ${POSTURES.length} postures; the picture tells of ${who}`);

@@ -6,18 +6,24 @@ import { basis, html } from './lungs.mjs';
 
 /** Check that each view shows the side of the body that it names, with the patient's axes in the right directions. */
 async function checkViews(page) {
-  const left = { a: [1, 0], p: [-1, 0], h: [1, 0], f: [1, 0] }; // where the patient's left is in the picture: x right, y up
+  // Where the patient's left is in the picture: x right, y up
+  const left = { a: [1, 0], p: [-1, 0], h: [1, 0], f: [1, 0] };
   for (const [key, words] of Object.entries({ a: 'front', p: 'back', l: 'left', r: 'right', f: 'feet', h: 'head' })) {
     await press(page, key);
     await settled(page);
     assert.equal(await page.locator('#seen').textContent(), `seen from the ${words}`);
     const m = await page.evaluate(() => Array.from(window.supine.panes()[0].toEye));
-    if (left[key]) assert.ok(Math.abs(m[0] - left[key][0]) < 1e-6 && Math.abs(m[1] - left[key][1]) < 1e-6, `seen from ${key}: ${m}`);
+    if (left[key])
+      assert.ok(Math.abs(m[0] - left[key][0]) < 1e-6 && Math.abs(m[1] - left[key][1]) < 1e-6, `seen from ${key}: ${m}`);
     else assert.ok(Math.abs(m[2] - (key === 'l' ? 1 : -1)) < 1e-6, `seen from ${key}: ${m}`);
   }
   await press(page, 'a');
   await settled(page);
-  const [leftLung, middle] = await page.evaluate(() => ['left lung', 'right lung'].map((name) => window.supine.basis.lungBoxes[window.supine.basis.lungNames.indexOf(name)].centre[0]));
+  const [leftLung, middle] = await page.evaluate(() =>
+    ['left lung', 'right lung'].map(
+      (name) => window.supine.basis.lungBoxes[window.supine.basis.lungNames.indexOf(name)].centre[0],
+    ),
+  );
   assert.ok(leftLung > middle);
 }
 
@@ -25,10 +31,11 @@ async function checkViews(page) {
 async function checkCamera(page) {
   const box = await page.locator('#picture').boundingBox();
   const [x, y] = [box.x + box.width * 0.6, box.y + box.height * 0.4];
-  const under = () => page.evaluate(() => {
-    const pane = window.supine.panes()[0];
-    return [pane.toEye[12], pane.toEye[13]];
-  });
+  const under = () =>
+    page.evaluate(() => {
+      const pane = window.supine.panes()[0];
+      return [pane.toEye[12], pane.toEye[13]];
+    });
   const before = await under();
   await page.mouse.move(x, y);
   await page.mouse.down({ button: 'right' });
@@ -42,7 +49,10 @@ async function checkCamera(page) {
   await page.mouse.wheel(0, -400);
   await settled(page);
   const pan = await page.evaluate(() => window.supine.state.camera.pan);
-  assert.ok(pan[0] < -1 && pan[1] < -1, `zooming in at the upper right does not move the lungs to the lower left: ${pan}`);
+  assert.ok(
+    pan[0] < -1 && pan[1] < -1,
+    `zooming in at the upper right does not move the lungs to the lower left: ${pan}`,
+  );
   await press(page, '0');
 }
 
@@ -57,7 +67,23 @@ async function checkPostures(page) {
       const u = h > 1e-6 ? [g[0] / h, g[1] / h] : [0, 1];
       return [u[0] * (h * c - g[2] * s), u[1] * (h * c - g[2] * s), h * s + g[2] * c];
     };
-    return ['supine', 'prone', 'left', 'right', 'upright', 'inverted', 'supine+15', 'prone-20', 'left+45', 'right-30', 'supine@30', '0.60:0.00:-0.80', '0:-1:0', 'HFP', 'AFDL'].map((text) => [text, postureText(turned(text)), turned(text)]);
+    return [
+      'supine',
+      'prone',
+      'left',
+      'right',
+      'upright',
+      'inverted',
+      'supine+15',
+      'prone-20',
+      'left+45',
+      'right-30',
+      'supine@30',
+      '0.60:0.00:-0.80',
+      '0:-1:0',
+      'HFP',
+      'AFDL',
+    ].map((text) => [text, postureText(turned(text)), turned(text)]);
   });
   for (const [text, again, gravity] of texts) {
     assert.equal(again, { '0:-1:0': 'prone', HFP: 'prone', AFDL: 'left' }[text] ?? text);
@@ -80,15 +106,42 @@ async function checkShown(page) {
   await page.mouse.move(750, 6); // off the lungs, so that no value is shown
   const before = await picture(page);
   for (const [name, act, undo] of [
-    ['a faded lung', () => page.locator('[name=lung-0][value="0.35"]').check(), () => page.locator('[name=lung-0][value="1"]').check()],
-    ['a hidden lung', () => page.locator('[name=lung-1][value="0"]').check(), () => page.locator('[name=lung-1][value="1"]').check()],
+    [
+      'a faded lung',
+      () => page.locator('[name=lung-0][value="0.35"]').check(),
+      () => page.locator('[name=lung-0][value="1"]').check(),
+    ],
+    [
+      'a hidden lung',
+      () => page.locator('[name=lung-1][value="0"]').check(),
+      () => page.locator('[name=lung-1][value="1"]').check(),
+    ],
     ['a cut', () => page.locator('#cut-axis').selectOption('1'), () => page.locator('#cut-axis').selectOption('-1')],
     ['no contours', () => page.locator('#contours').uncheck(), () => page.locator('#contours').check()],
-    ...['ghost', 'arrows', 'wires', 'beside'].map((id) => [id, () => page.locator(`#${id}`).check(), () => page.locator(`#${id}`).uncheck()]),
-    ['expansion', () => page.locator('[name=kind][value=expansion]').check(), () => page.locator('[name=kind][value=displacement]').check()],
+    ...['ghost', 'arrows', 'wires', 'beside'].map((id) => [
+      id,
+      () => page.locator(`#${id}`).check(),
+      () => page.locator(`#${id}`).uncheck(),
+    ]),
+    [
+      'expansion',
+      () => page.locator('[name=kind][value=expansion]').check(),
+      () => page.locator('[name=kind][value=displacement]').check(),
+    ],
     ['no colours', () => page.locator('#coloured').uncheck(), () => page.locator('#coloured').check()],
-    ['the scan as reference', () => page.locator('[name=since][value="1"]').check(), () => page.locator('[name=since][value="0"]').check()],
-    ['a typed range', async () => { await page.locator('#range-end').fill('11'); await page.locator('#range-end').blur(); }, () => page.locator('#range-auto').click()],
+    [
+      'the scan as reference',
+      () => page.locator('[name=since][value="1"]').check(),
+      () => page.locator('[name=since][value="0"]').check(),
+    ],
+    [
+      'a typed range',
+      async () => {
+        await page.locator('#range-end').fill('11');
+        await page.locator('#range-end').blur();
+      },
+      () => page.locator('#range-auto').click(),
+    ],
   ]) {
     await act();
     await assertPicture(page, before, `${name} changes nothing`, false);
@@ -100,12 +153,18 @@ async function checkShown(page) {
 /** Return the picture that a user saves, without the page around it. */
 async function drawn(page) {
   await settled(page);
-  return page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer())).join());
+  return page.evaluate(async () =>
+    Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer())).join(),
+  );
 }
 
 /** Check that a lung is seen from every side, also through the table on which the patient lies. */
 async function checkSides(page) {
-  for (const [posture, views] of [['1', 'ap'], ['2', 'ap'], ['3', 'lr']]) {
+  for (const [posture, views] of [
+    ['1', 'ap'],
+    ['2', 'ap'],
+    ['3', 'lr'],
+  ]) {
     for (const view of views) {
       await press(page, posture);
       await press(page, view);
@@ -124,13 +183,19 @@ async function checkSides(page) {
 /** Check that marked points move with the tissue and measure distances, and that a link restores them. */
 async function checkProbes(page) {
   const box = await page.locator('#picture').boundingBox();
-  for (const [x, y] of [[0.38, 0.5], [0.62, 0.55]]) {
+  for (const [x, y] of [
+    [0.38, 0.5],
+    [0.62, 0.55],
+  ]) {
     const had = await page.evaluate(() => window.supine.state.probes.length);
     await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
     await page.waitForFunction((n) => window.supine.state.probes.length > n, had);
   }
   await page.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
-  const [list, between] = [await page.locator('#probes').textContent(), await page.locator('#probes-text').textContent()];
+  const [list, between] = [
+    await page.locator('#probes').textContent(),
+    await page.locator('#probes-text').textContent(),
+  ];
   assert.match(list, /1  (left|right) lung  [\d.]+ mm  [LR] \d+  [PA] \d+  [HF] \d+ mm/);
   assert.match(between, /1 to 2: [\d.]+ mm; supine at rest [\d.]+ mm/);
   await press(page, '2');
@@ -139,7 +204,12 @@ async function checkProbes(page) {
   const hash = await page.evaluate(() => location.hash);
   const { page: again } = await openLungs(html, {}, hash);
   await again.waitForFunction(() => document.querySelectorAll('#probes li').length === 2);
-  const facts = (p) => p.evaluate(() => [window.supine.state.gravity.map((v) => v.toFixed(6)), document.getElementById('probes').textContent, document.getElementById('depth-value').textContent]);
+  const facts = (p) =>
+    p.evaluate(() => [
+      window.supine.state.gravity.map((v) => v.toFixed(6)),
+      document.getElementById('probes').textContent,
+      document.getElementById('depth-value').textContent,
+    ]);
   assert.deepEqual(await facts(again), await facts(page));
   await close(again);
   await page.locator('#probes-clear').click();
@@ -150,7 +220,10 @@ async function checkLoss(page) {
   await press(page, '3');
   await page.mouse.move(5, 5);
   const before = await picture(page);
-  await page.evaluate(() => { window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context'); window.lose.loseContext(); });
+  await page.evaluate(() => {
+    window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context');
+    window.lose.loseContext();
+  });
   await page.waitForFunction(() => window.supine.picture === null);
   await page.evaluate(() => window.lose.restoreContext());
   await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
@@ -163,8 +236,15 @@ async function checkFrames(page) {
     const { picture: p, touch } = window.supine;
     let count = 0;
     const draw = p.draw.bind(p);
-    p.draw = (panes) => { ++count; draw(panes); };
-    const frames = (n) => new Promise((done) => { const next = () => (n-- > 0 ? requestAnimationFrame(next) : done()); next(); });
+    p.draw = (panes) => {
+      ++count;
+      draw(panes);
+    };
+    const frames = (n) =>
+      new Promise((done) => {
+        const next = () => (n-- > 0 ? requestAnimationFrame(next) : done());
+        next();
+      });
     await frames(3);
     count = 0;
     await frames(10);
@@ -187,7 +267,9 @@ await checkSides(page);
 await checkProbes(page);
 await checkFrames(page);
 await checkLoss(page);
-const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)));
+const bytes = await page.evaluate(async () =>
+  Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)),
+);
 assert.deepEqual(bytes, [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
 /* If the button `pin` is pressed while the patient turns, the posture at the end of the turn becomes the reference. */
 const goal = await page.evaluate(() => {
@@ -198,6 +280,8 @@ const goal = await page.evaluate(() => {
   return postureText(gravityOf(state.pinnedQ));
 });
 assert.equal(goal, 'prone');
-assert.deepEqual(complaints.filter((text) => !text.includes('CONTEXT_LOST')), []);
+assert.deepEqual(
+  complaints.filter((text) => !text.includes('CONTEXT_LOST')),
+  [],
+);
 await close(page);
-

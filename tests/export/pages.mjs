@@ -2,7 +2,23 @@
 // All browser tests in one process with one Chromium: node pages.mjs [NAME...]
 import { browser } from './browser.mjs';
 
-const all = ['page', 'page_answer', 'page_breathing_fields', 'page_fields', 'page_hands', 'page_inside', 'page_first', 'page_lungs', 'page_numbers', 'page_targets', 'page_room', 'page_views', 'page_sizes', 'accessibility', 'report'];
+const all = [
+  'page',
+  'page_answer',
+  'page_breathing_fields',
+  'page_fields',
+  'page_hands',
+  'page_inside',
+  'page_first',
+  'page_lungs',
+  'page_numbers',
+  'page_targets',
+  'page_room',
+  'page_views',
+  'page_sizes',
+  'accessibility',
+  'report',
+];
 for (const name of process.argv.length > 2 ? process.argv.slice(2) : all) {
   const begin = performance.now();
   await import(`./${name}.mjs`);

@@ -50,10 +50,24 @@ process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
 /** Write a safetensors file of float64 tensors, {name: [shape, numbers]}. */
 function writeTensors(path, tensors) {
   let at = 0;
-  const header = JSON.stringify(Object.fromEntries(Object.entries(tensors).map(([name, [shape, numbers]]) => [name, { dtype: 'F64', shape, data_offsets: [at, at += 8 * numbers.length] }])));
+  const header = JSON.stringify(
+    Object.fromEntries(
+      Object.entries(tensors).map(([name, [shape, numbers]]) => [
+        name,
+        { dtype: 'F64', shape, data_offsets: [at, (at += 8 * numbers.length)] },
+      ]),
+    ),
+  );
   const size = Buffer.alloc(8);
   size.writeBigUInt64LE(BigInt(header.length));
-  writeFileSync(path, Buffer.concat([size, Buffer.from(header), ...Object.values(tensors).map(([, numbers]) => Buffer.from(Float64Array.from(numbers).buffer))]));
+  writeFileSync(
+    path,
+    Buffer.concat([
+      size,
+      Buffer.from(header),
+      ...Object.values(tensors).map(([, numbers]) => Buffer.from(Float64Array.from(numbers).buffer)),
+    ]),
+  );
 }
 
 /** Return the numbers of a tensor of 32-bit floats of a safetensors file. */
@@ -64,48 +78,84 @@ export function floatsOf(path, name) {
   return new Float32Array(Uint8Array.from(bytes.subarray(start + begin, start + end)).buffer);
 }
 
-/** Write a phantom with about `vertices` vertices to `path`. Return its points, and for each of them whether it belongs to
- * the left lung. */
+/** Write a phantom with about `vertices` vertices to `path`. Return its points, and for each of them whether it
+ * belongs to the left lung. */
 function phantomPoints(path, vertices) {
   supine('phantom', '--vertices', String(vertices), '-o', path);
-  const lines = readFileSync(path, 'utf8').split('\n').map((line) => line.split(' '));
+  const lines = readFileSync(path, 'utf8')
+    .split('\n')
+    .map((line) => line.split(' '));
   const points = lines.filter(([kind]) => kind === 'v').map((words) => words.slice(1, 4).map(Number));
-  const of = points.map((_, i) => i); // a vertex of the same lung; the last in the chain is the same for all vertices of a lung
-  const last = (v) => { while (of[v] !== v) v = of[v] = of[of[v]]; return v; };
-  for (const [kind, ...corners] of lines) if (kind === 'f') for (const corner of corners) of[last(parseInt(corner, 10) - 1)] = last(parseInt(corners[0], 10) - 1);
+  // A vertex of the same lung; the last in the chain is the same for all vertices of a lung
+  const of = points.map((_, i) => i);
+  const last = (v) => {
+    while (of[v] !== v) v = of[v] = of[of[v]];
+    return v;
+  };
+  for (const [kind, ...corners] of lines)
+    if (kind === 'f')
+      for (const corner of corners) of[last(parseInt(corner, 10) - 1)] = last(parseInt(corners[0], 10) - 1);
   const leftmost = points.reduce((most, p, i) => (p[0] > points[most][0] ? i : most), 0);
   return { points, left: points.map((_, i) => last(i) === last(leftmost)) };
 }
 
-/** Write a basis of fields over gravity and volume of a phantom with about `vertices` vertices. The right lung opens later
- * than the left lung. `storage` is modes or clusters; `options` are further ones of precompute. */
+/** Write a basis of fields over gravity and volume of a phantom with about `vertices` vertices. The right lung opens
+ * later than the left lung. `storage` is modes or clusters; `options` are further ones of precompute. */
 export function breathingFieldsBasis(path, vertices, storage, ...options) {
   const [mesh, fields] = ['breathing.obj', 'breathing-fields.safetensors'].map((name) => join(folder, name));
   const { points, left } = phantomPoints(mesh, vertices);
-  const centres = [false, true].map((side) => [0, 1, 2].map((axis) => {
-    const own = points.filter((_, i) => left[i] === side);
-    return own.reduce((sum, p) => sum + p[axis], 0) / own.length;
-  }));
-  const move = (g, s) => points.map((p, i) => {
-    const q = p.map((x, axis) => (x - centres[Number(left[i])][axis]) / 100);
-    const along = q[0] * g[0] + q[1] * g[1] + q[2] * g[2];
-    const open = left[i] ? s : s * (0.4 + 0.6 * s);
-    return q.map((x, axis) => 16 * (open - 0.2) * x + (1 - 0.6 * s) * ((7 - 3 * (q[0] ** 2 + q[1] ** 2 + q[2] ** 2)) * g[axis] + 3 * Math.tanh(along) * x) - (axis === 2 ? 4 * open * open * x * x : 0));
-  });
-  const directions = supine('precompute', '--directions', '20').trim().split('\n').slice(1).map((line) => line.split(',').map(Number));
+  const centres = [false, true].map((side) =>
+    [0, 1, 2].map((axis) => {
+      const own = points.filter((_, i) => left[i] === side);
+      return own.reduce((sum, p) => sum + p[axis], 0) / own.length;
+    }),
+  );
+  const move = (g, s) =>
+    points.map((p, i) => {
+      const q = p.map((x, axis) => (x - centres[Number(left[i])][axis]) / 100);
+      const along = q[0] * g[0] + q[1] * g[1] + q[2] * g[2];
+      const open = left[i] ? s : s * (0.4 + 0.6 * s);
+      return q.map(
+        (x, axis) =>
+          16 * (open - 0.2) * x +
+          (1 - 0.6 * s) * ((7 - 3 * (q[0] ** 2 + q[1] ** 2 + q[2] ** 2)) * g[axis] + 3 * Math.tanh(along) * x) -
+          (axis === 2 ? 4 * open * open * x * x : 0),
+      );
+    });
+  const directions = supine('precompute', '--directions', '20')
+    .trim()
+    .split('\n')
+    .slice(1)
+    .map((line) => line.split(',').map(Number));
   const runs = [0, 1 / 3, 2 / 3, 1].flatMap((s) => directions.map((g) => [g, s]));
-  writeTensors(fields, { points: [[points.length, 3], points.flat()], gravity: [[runs.length, 3], runs.flatMap(([g]) => g)], displacement: [[runs.length, points.length, 3], runs.flatMap(([g, s]) => move(g, s).flat())] });
+  writeTensors(fields, {
+    points: [[points.length, 3], points.flat()],
+    gravity: [[runs.length, 3], runs.flatMap(([g]) => g)],
+    displacement: [[runs.length, points.length, 3], runs.flatMap(([g, s]) => move(g, s).flat())],
+  });
   supine('precompute', mesh, '--fields', fields, '--modes', '16', '--storage', storage, ...options, '-o', path);
 }
 
-/** Write a basis of smooth fields, as another simulator may compute them, of a phantom with about `vertices` vertices. It
- * has more than 20 vector modes. */
+/** Write a basis of smooth fields, as another simulator may compute them, of a phantom with about `vertices` vertices.
+ * It has more than 20 vector modes. */
 export function fieldsBasis(path, vertices) {
   const [mesh, fields] = ['fields.obj', 'fields.safetensors'].map((name) => join(folder, name));
   const { points } = phantomPoints(mesh, vertices);
-  const gravity = supine('precompute', '--directions', '100').trim().split('\n').slice(1).map((line) => line.split(',').map(Number));
-  const wave = ([gx, gy, gz], [x, y, z]) => [6 * Math.sin(gx * (2 + x / 60)), 8 * gy + 3 * Math.cos(2 * gz + (gx * y) / 40), 5 * gz + 4 * Math.sin(gx + (gy * z) / 50)];
-  writeTensors(fields, { points: [[points.length, 3], points.flat()], gravity: [[gravity.length, 3], gravity.flat()], displacement: [[gravity.length, points.length, 3], gravity.flatMap((g) => points.flatMap((p) => wave(g, p)))] });
+  const gravity = supine('precompute', '--directions', '100')
+    .trim()
+    .split('\n')
+    .slice(1)
+    .map((line) => line.split(',').map(Number));
+  const wave = ([gx, gy, gz], [x, y, z]) => [
+    6 * Math.sin(gx * (2 + x / 60)),
+    8 * gy + 3 * Math.cos(2 * gz + (gx * y) / 40),
+    5 * gz + 4 * Math.sin(gx + (gy * z) / 50),
+  ];
+  writeTensors(fields, {
+    points: [[points.length, 3], points.flat()],
+    gravity: [[gravity.length, 3], gravity.flat()],
+    displacement: [[gravity.length, points.length, 3], gravity.flatMap((g) => points.flatMap((p) => wave(g, p)))],
+  });
   supine('precompute', mesh, '--fields', fields, '--modes', '30', '--scanned', 'supine', '-o', path);
 }
 
@@ -113,7 +163,12 @@ export function fieldsBasis(path, vertices) {
 export function deformed(basis, ...state) {
   const path = join(folder, 'deformed.obj');
   supine('deform', basis, ...state, '-o', path);
-  return Float64Array.from(readFileSync(path, 'utf8').split('\n').filter((line) => line.startsWith('v ')).flatMap((line) => line.split(' ').slice(1, 4).map(Number)));
+  return Float64Array.from(
+    readFileSync(path, 'utf8')
+      .split('\n')
+      .filter((line) => line.startsWith('v '))
+      .flatMap((line) => line.split(' ').slice(1, 4).map(Number)),
+  );
 }
 
 /** Return a generator of uniform random numbers in [0, 1) (mulberry32). */
@@ -138,12 +193,12 @@ export function randomDirections(count, seed) {
   });
 }
 
-/** Evaluate [gravity, mL] pairs in C. Return {scale, xyz} for each: the factor of the first lung's displacement, and the
- * positions, mm. */
+/** Evaluate [gravity, mL] pairs in C. Return {scale, xyz} for each: the factor of the first lung's displacement, and
+ * the positions, mm. */
 export function evaluate(basis, pairs) {
-  const bytes = execFileSync(
-    process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))],
-    { maxBuffer: 1 << 30 });
+  const bytes = execFileSync(process.env.POSITIONS, [basis, ...pairs.map(([g, volume]) => [...g, volume].join(','))], {
+    maxBuffer: 1 << 30,
+  });
   const size = bytes.length / pairs.length;
   return pairs.map((_, i) => {
     const part = Uint8Array.prototype.slice.call(bytes, i * size, (i + 1) * size).buffer;
@@ -159,15 +214,19 @@ export function matchPoints(points, others, tolerance) {
   const shifts = [-1, 0, 1].flatMap((x) => [-1, 0, 1].flatMap((y) => [-1, 0, 1].map((z) => [x, y, z])));
   const apart = (i, j) => Math.hypot(...[0, 1, 2].map((k) => points[3 * i + k] - others[3 * j + k]));
   assert.equal(points.length, others.length);
-  for (let j = 0; j < others.length / 3; ++j) cells.set(cellOf(others, j), [...(cells.get(cellOf(others, j)) ?? []), j]);
-  const found = Array.from({ length: points.length / 3 }, (_, i) => shifts.flatMap((shift) => cells.get(cellOf(points, i, shift)) ?? []).find((j) => apart(i, j) < tolerance));
+  for (let j = 0; j < others.length / 3; ++j)
+    cells.set(cellOf(others, j), [...(cells.get(cellOf(others, j)) ?? []), j]);
+  const found = Array.from({ length: points.length / 3 }, (_, i) =>
+    shifts.flatMap((shift) => cells.get(cellOf(points, i, shift)) ?? []).find((j) => apart(i, j) < tolerance),
+  );
   assert.equal(new Set(found).size, found.length);
   assert.ok(!found.includes(undefined));
   return found;
 }
 
 /** Return the points [N, 3] permuted by `order`. */
-export const inOrder = (points, order) => Float64Array.from(order.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
+export const inOrder = (points, order) =>
+  Float64Array.from(order.flatMap((i) => [...points.subarray(3 * i, 3 * i + 3)]));
 
 /** Return the largest distance between points of equal index. */
 export function largestDistance(a, b) {

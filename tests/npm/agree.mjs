@@ -10,11 +10,18 @@ async function check(basis, states, ask) {
   for (const [i, state] of states.entries()) {
     const [js, c] = [said[i], native(basis, state, said[i].volumes.length)];
     const apart = largestDistance(js.positions, c.positions);
-    assert.ok(js.error < 0.01 && apart <= 2 * js.error, `${basis} ${state}: ${apart} mm apart, where ${js.error} mm are allowed`);
+    assert.ok(
+      js.error < 0.01 && apart <= 2 * js.error,
+      `${basis} ${state}: ${apart} mm apart, where ${js.error} mm are allowed`,
+    );
     assert.ok(largestDistance(js.normals, c.normals) < 1e-3, `${basis} ${state}: normals`);
-    js.volumes.forEach((volume, lung) => assert.ok(Math.abs(volume - c.volumes[lung]) <= 1e-9 * c.volumes[lung], `${basis} ${state}: ${volume} mL`));
+    js.volumes.forEach((volume, lung) =>
+      assert.ok(Math.abs(volume - c.volumes[lung]) <= 1e-9 * c.volumes[lung], `${basis} ${state}: ${volume} mL`),
+    );
     assert.equal(js.expected.length, c.expected.length);
-    js.expected.forEach((sigma, v) => assert.ok(Math.abs(sigma - c.expected[v]) < 1e-3, `${basis} ${state}: expected error ${sigma} mm of vertex ${v}`));
+    js.expected.forEach((sigma, v) =>
+      assert.ok(Math.abs(sigma - c.expected[v]) < 1e-3, `${basis} ${state}: expected error ${sigma} mm of vertex ${v}`),
+    );
   }
 }
 
@@ -23,7 +30,13 @@ export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();
     const unknown = lungs.metadata.route === 'fields'; // another simulator's fields, whose error is unknown
-    return { positions: lungs.positions.slice(), normals: lungs.normals.slice(), volumes: Object.values(lungs.volumes), expected: unknown ? new Float32Array(lungs.vertexCount) : lungs.expectedError().slice(), error: lungs.error };
+    return {
+      positions: lungs.positions.slice(),
+      normals: lungs.normals.slice(),
+      volumes: Object.values(lungs.volumes),
+      expected: unknown ? new Float32Array(lungs.vertexCount) : lungs.expectedError().slice(),
+      error: lungs.error,
+    };
   });
 }
 

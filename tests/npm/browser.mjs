@@ -14,32 +14,47 @@ async function visit(path) {
   const page = await browser.newPage({ viewport: { width: 320, height: 240 } });
   page.setDefaultTimeout(120000); // ms, long enough on a busy machine
   const complaints = [];
-  page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(message.text());
+  });
   page.on('pageerror', (error) => complaints.push(error.stack));
   await page.route('**/*', (route) => {
     const file = join(folder, decodeURI(new URL(route.request().url()).pathname));
-    return existsSync(file) ? route.fulfill({ contentType: kinds[extname(file)] ?? 'application/octet-stream', body: readFileSync(file) }) : route.fulfill({ status: 404 });
+    return existsSync(file)
+      ? route.fulfill({ contentType: kinds[extname(file)] ?? 'application/octet-stream', body: readFileSync(file) })
+      : route.fulfill({ status: 404 });
   });
   await page.goto(origin + path);
   return { page, complaints };
 }
 
-for (const example of ['three', 'vtk']) copyFileSync(join(folder, `node_modules/supine/examples/${example}.html`), join(folder, `${example}.html`));
+for (const example of ['three', 'vtk'])
+  copyFileSync(join(folder, `node_modules/supine/examples/${example}.html`), join(folder, `${example}.html`));
 writeFileSync(join(folder, 'blank.html'), '<!doctype html>');
 const { page } = await visit('blank.html');
-await checkAll((basis, states) => page.evaluate(async ([file, states, code]) => {
-  const { open } = await import('/node_modules/supine/supine.js');
-  const lungs = await open(await (await fetch(file)).arrayBuffer());
-  const plain = (value) => (ArrayBuffer.isView(value) ? Array.from(value) : value);
-  return new Function(`return ${code}`)()(lungs, states).map((one) => Object.fromEntries(Object.entries(one).map(([name, value]) => [name, plain(value)])));
-}, [`/${basename(basis)}`, states, pose.toString()]), 2);
+await checkAll(
+  (basis, states) =>
+    page.evaluate(
+      async ([file, states, code]) => {
+        const { open } = await import('/node_modules/supine/supine.js');
+        const lungs = await open(await (await fetch(file)).arrayBuffer());
+        const plain = (value) => (ArrayBuffer.isView(value) ? Array.from(value) : value);
+        return new Function(`return ${code}`)()(lungs, states).map((one) =>
+          Object.fromEntries(Object.entries(one).map(([name, value]) => [name, plain(value)])),
+        );
+      },
+      [`/${basename(basis)}`, states, pose.toString()],
+    ),
+  2,
+);
 await page.close();
 
 /** Take a screenshot and return the red values of its pixels. */
 async function look(page) {
   await settled(page);
   const shot = (await page.screenshot()).toString('base64');
-  if (process.env.PICTURES) writeFileSync(join(process.env.PICTURES, `${await page.title()}.png`), Buffer.from(shot, 'base64'));
+  if (process.env.PICTURES)
+    writeFileSync(join(process.env.PICTURES, `${await page.title()}.png`), Buffer.from(shot, 'base64'));
   return page.evaluate(async (data) => {
     const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
     const canvas = new OffscreenCanvas(image.width, image.height).getContext('2d');

@@ -12,20 +12,36 @@ export const packed = join(folder, 'node_modules/supine');
 mkdirSync(packed, { recursive: true });
 execFileSync('tar', ['xzf', process.env.TARBALL, '-C', packed, '--strip-components=1']);
 
-export const [mesh, demo, content, inside, unrested] = ['lungs.ply', 'lungs.safetensors', 'content.csv', 'inside.safetensors', 'unrested.safetensors'].map((name) => join(folder, name));
+export const [mesh, demo, content, inside, unrested] = [
+  'lungs.ply',
+  'lungs.safetensors',
+  'content.csv',
+  'inside.safetensors',
+  'unrested.safetensors',
+].map((name) => join(folder, name));
 copyFileSync(process.env.GOLDEN, unrested);
 supine('phantom', '-o', mesh);
 supine('precompute', mesh, '-o', demo);
 writeFileSync(content, 'name,x,y,z\nnodule,-80,-120,-90\nother,70,-150,-120\n');
 supine('embed', demo, content, mesh, '-o', inside);
-const states = ['supine', 'prone:rest+500', 'left:full-1500', 'supine+35:rest+120', '0.6:0.2:-0.7:2600mL', 'upright:full'];
+const states = [
+  'supine',
+  'prone:rest+500',
+  'left:full-1500',
+  'supine+35:rest+120',
+  '0.6:0.2:-0.7:2600mL',
+  'upright:full',
+];
 const ofScan = ['supine:scan+200', 'prone:scan+500', '0.6:0.2:-0.7:scan-100']; // for a basis without volumes at rest
 /** Paths of bases, each with the states to test. */
-export const bases = [[demo, states], [inside, states], [unrested, ofScan]];
+export const bases = [
+  [demo, states],
+  [inside, states],
+  [unrested, ofScan],
+];
 const real = ['left', 'right'].map((side) => join(process.env.LUNGS, `${side}.obj`));
 bases.push([join(folder, 'real.safetensors'), states]);
 supine('precompute', ...real, '-o', bases.at(-1)[0]);
-
 
 /** Bases of fields over gravity and volume, stored as modes and as clusters. */
 export const breathing = ['modes', 'clusters'].map((storage) => join(folder, `breathing-${storage}.safetensors`));
@@ -40,5 +56,10 @@ export function native(basis, state, lungs) {
   const bytes = buffer.slice(byteOffset);
   const n = (bytes.byteLength - 8 * lungs) / 28;
   const floats = (at, count) => new Float32Array(bytes, 8 * lungs + 4 * at, count);
-  return { volumes: Array.from(new Float64Array(bytes, 0, lungs)), positions: floats(0, 3 * n), normals: floats(3 * n, 3 * n), expected: floats(6 * n, n) };
+  return {
+    volumes: Array.from(new Float64Array(bytes, 0, lungs)),
+    positions: floats(0, 3 * n),
+    normals: floats(3 * n, 3 * n),
+    expected: floats(6 * n, n),
+  };
 }

@@ -22,12 +22,23 @@ const small = brotliCompressSync(wasm).length;
 console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
 assert.ok(wasm.length <= 150000 && small <= 52000);
 
-/* A basis is opened from a path, an address, a Blob, a Response, or a promise. Other values are refused with what it takes;
- * a file that cannot be read is named. */
-for (const source of [demo, pathToFileURL(demo), new Blob([bytes]), new Response(bytes), Promise.resolve(bytes), Promise.resolve(demo)]) {
+/* A basis is opened from a path, an address, a Blob, a Response, or a promise. Other values are refused with what it
+ * takes; a file that cannot be read is named. */
+for (const source of [
+  demo,
+  pathToFileURL(demo),
+  new Blob([bytes]),
+  new Response(bytes),
+  Promise.resolve(bytes),
+  Promise.resolve(demo),
+]) {
   assert.equal((await open(source)).vertexCount, (await open(bytes)).vertexCount);
 }
-for (const source of [undefined, null, 5, {}, [1, 2]]) await assert.rejects(open(source), { status: 'argument', message: /a path, the bytes of a basis file, a Blob, a Response/ });
+for (const source of [undefined, null, 5, {}, [1, 2]])
+  await assert.rejects(open(source), {
+    status: 'argument',
+    message: /a path, the bytes of a basis file, a Blob, a Response/,
+  });
 await assert.rejects(open(join(folder, 'none.safetensors')), { status: 'read', message: /none\.safetensors/ });
 await assert.rejects(open(new Response('', { status: 404 })), { status: 'read', message: /404/ });
 
@@ -44,19 +55,32 @@ const single = (await open(bytes, { exact: true })).pose('prone:rest+500');
 const [{ weights, gains }, modes] = [single.uniforms, single.tensor('coefficients')];
 const [direction, all] = [single.tensor('direction').data, single.deform()];
 for (const v of [0, 17, single.vertexCount - 1]) {
-  const amount = modes.data.subarray(v * modes.shape[1], (v + 1) * modes.shape[1]).reduce((sum, c, k) => sum + c * weights[k], 0);
+  const amount = modes.data
+    .subarray(v * modes.shape[1], (v + 1) * modes.shape[1])
+    .reduce((sum, c, k) => sum + c * weights[k], 0);
   const lung = Object.values(single.lungs).findIndex(([, end]) => v < end);
-  const sum = [0, 1, 2].map((axis) => single.vertices[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis]);
-  assert.ok(largestDistance(single.at(v), all.subarray(3 * v, 3 * v + 3)) < 1e-4 && largestDistance(sum, single.at(v)) < 1e-3, `vertex ${v}`);
+  const sum = [0, 1, 2].map(
+    (axis) => single.vertices[3 * v + axis] + gains[3 * lung + axis] * amount * direction[3 * v + axis],
+  );
+  assert.ok(
+    largestDistance(single.at(v), all.subarray(3 * v, 3 * v + 3)) < 1e-4 && largestDistance(sum, single.at(v)) < 1e-3,
+    `vertex ${v}`,
+  );
 }
 assert.throws(() => single.at(single.vertexCount), { status: 'argument' });
 assert.equal(single.simulatedRange([0, 1, 0], 'rest'), undefined);
 
-/* Two open bases do not affect each other, and their arrays stay valid. A state can be given as text, or as gravity with
- * a volume or a gain (factor of the displacements). A refused state changes nothing. */
-const [lungs, other] = [await open(bytes), await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm })];
+/* Two open bases do not affect each other, and their arrays stay valid. A state can be given as text, or as gravity
+ * with a volume or a gain (factor of the displacements). A refused state changes nothing. */
+const [lungs, other] = [
+  await open(bytes),
+  await open(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), { wasm }),
+];
 const { positions, normals } = lungs;
-assert.ok(largestDistance(positions, lungs.vertices) < 0.002, 'positions before the first pose differ from those in the file');
+assert.ok(
+  largestDistance(positions, lungs.vertices) < 0.002,
+  'positions before the first pose differ from those in the file',
+);
 lungs.pose('prone:rest+500').deformLit();
 const prone = positions.slice();
 other.pose({ gravity: new Float32Array([0, -2, 0]), volume: 'rest+500' }).deform();
@@ -70,11 +94,26 @@ assert.ok(lungs.positions === positions && lungs.normals === normals && position
 lungs.pose({ gravity: [0, -1, 0], gain: 0 }).deform();
 assert.ok(largestDistance(positions, lungs.vertices) < 0.002);
 lungs.pose('prone:rest+500');
-for (const [state, status, words] of [['pron', 'argument', /did you mean 'prone'/], ['prone:500', 'argument', /500/], ['prone:full-30000', 'numerical', /folds/],
-  [{ gravity: [0, 0, 0] }, 'argument', /gravity/], [{ gravity: [0, NaN, 0], gain: 1 }, 'argument', /gravity/], [`prone:${'0'.repeat(600)}mL`, 'argument', /at most 511/],
-  [{ posture: 'prone:rest', volume: 'full' }, 'argument', /no member 'posture'/], [[0, -1, 0], 'argument', /text/], [5, 'argument', /text/], [null, 'argument', /text/],
-  [{ volume: 'prone:rest' }, 'argument', /volume/], [{ gain: 1, volume: 'full' }, 'argument', /one of them/], ['supine:90L', 'numerical', /folds/]]) {
-  assert.throws(() => lungs.pose(state), (error) => error instanceof SupineError && error.status === status && words.test(error.message), `${JSON.stringify(state)}`);
+for (const [state, status, words] of [
+  ['pron', 'argument', /did you mean 'prone'/],
+  ['prone:500', 'argument', /500/],
+  ['prone:full-30000', 'numerical', /folds/],
+  [{ gravity: [0, 0, 0] }, 'argument', /gravity/],
+  [{ gravity: [0, NaN, 0], gain: 1 }, 'argument', /gravity/],
+  [`prone:${'0'.repeat(600)}mL`, 'argument', /at most 511/],
+  [{ posture: 'prone:rest', volume: 'full' }, 'argument', /no member 'posture'/],
+  [[0, -1, 0], 'argument', /text/],
+  [5, 'argument', /text/],
+  [null, 'argument', /text/],
+  [{ volume: 'prone:rest' }, 'argument', /volume/],
+  [{ gain: 1, volume: 'full' }, 'argument', /one of them/],
+  ['supine:90L', 'numerical', /folds/],
+]) {
+  assert.throws(
+    () => lungs.pose(state),
+    (error) => error instanceof SupineError && error.status === status && words.test(error.message),
+    `${JSON.stringify(state)}`,
+  );
 }
 assert.deepEqual(lungs.deform(), prone);
 try {
@@ -84,7 +123,11 @@ try {
   assert.throws(() => lungs.pose('pron'), { message: error.stderr.toString().trim() });
 }
 for (const cut of [0, 7, 1000, bytes.length - 1]) {
-  await assert.rejects(open(bytes.subarray(0, cut)), (error) => error instanceof SupineError && error.status === 'format', `${cut} bytes`);
+  await assert.rejects(
+    open(bytes.subarray(0, cut)),
+    (error) => error instanceof SupineError && error.status === 'format',
+    `${cut} bytes`,
+  );
 }
 
 /* The lungs of a simulator do not jump where a volume begins to differ from that of the scan. */
@@ -104,32 +147,59 @@ assert.equal(Math.max(...lungs.triangles), lungs.vertexCount - 1);
 assert.deepEqual(lungs.tensor('coefficients').shape[0], lungs.vertexCount);
 assert.equal(lungs.tensor('none'), undefined);
 assert.ok(lungs.tensor('normals').data instanceof Int8Array); // numbers.mjs reads every tensor of a file
+const numberWanted = (what) => ({ status: 'argument', message: what });
 for (const nothing of [null, '', [], '1', true]) {
-  assert.throws(() => lungs.pose({ gravity: [0, nothing, 1] }), { status: 'argument', message: /gravity has .*: give a number/ });
-  assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain: nothing }), { status: 'argument', message: /gain has .*: give a number/ });
-  assert.throws(() => lungs.pose({ gravity: nothing }), { status: 'argument', message: /gravity must be three numbers/ });
+  const [part, gain] = [{ gravity: [0, nothing, 1] }, { gravity: [0, 1, 0], gain: nothing }];
+  assert.throws(() => lungs.pose(part), numberWanted(/gravity has .*: give a number/));
+  assert.throws(() => lungs.pose(gain), numberWanted(/gain has .*: give a number/));
+  assert.throws(() => lungs.pose({ gravity: nothing }), numberWanted(/gravity must be three numbers/));
 }
 assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain: 9.81 }), { status: 'numerical', message: /allowFolds/ });
-for (const gain of [NaN, Infinity]) assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
+for (const gain of [NaN, Infinity])
+  assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
 /* The targets are the rows of 'supine deform': a row for each name, also of a mesh. */
 const [parts, table] = [await open(readFileSync(inside)), join(folder, 'targets.csv')];
-for (const [since, from] of [['supine:rest', ['--from', 'supine:rest']], [undefined, []]]) {
+for (const [since, from] of [
+  ['supine:rest', ['--from', 'supine:rest']],
+  [undefined, []],
+]) {
   supine('deform', inside, '--posture', 'left', ...from, '-o', table);
-  const rows = readFileSync(table, 'utf8').trim().split('\n').slice(2).map((line) => line.split(','));
+  const rows = readFileSync(table, 'utf8')
+    .trim()
+    .split('\n')
+    .slice(2)
+    .map((line) => line.split(','));
   const targets = parts.pose('left').targets(since);
-  assert.deepEqual(targets.map(({ name, lung }) => [name, lung]), rows.map((row) => row.slice(0, 2)));
-  assert.deepEqual(targets.filter(({ anatomy }) => anatomy).map(({ name }) => name), ['lungs']); // a mesh as large as the lungs
-  targets.forEach(({ at, move, mm, expectedError }, i) => [...at, ...move, mm, expectedError].forEach((x, k) => assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`)));
+  assert.deepEqual(
+    targets.map(({ name, lung }) => [name, lung]),
+    rows.map((row) => row.slice(0, 2)),
+  );
+  assert.deepEqual(
+    targets.filter(({ anatomy }) => anatomy).map(({ name }) => name),
+    ['lungs'],
+  ); // a mesh as large as the lungs
+  targets.forEach(({ at, move, mm, expectedError }, i) =>
+    [...at, ...move, mm, expectedError].forEach((x, k) =>
+      assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`),
+    ),
+  );
 }
 
 /* Fields over gravity and volume have no gain. Targets inside them move by the weights of their lung, from the scan. */
 const [breaths, breathed] = [await open(readFileSync(breathing[1])), join(folder, 'breathed.safetensors')];
-assert.throws(() => breaths.pose({ gravity: [0, 1, 0], gain: 1 }), { status: 'unsupported', message: /give a volume instead of a gain/ });
+assert.throws(() => breaths.pose({ gravity: [0, 1, 0], gain: 1 }), {
+  status: 'unsupported',
+  message: /give a volume instead of a gain/,
+});
 supine('embed', breathing[1], content, '-o', breathed);
 supine('deform', breathed, '--posture', 'left', '--volume', 'left=3000mL,right=3900mL', '-o', table);
-const rowsOf = readFileSync(table, 'utf8').trim().split('\n').slice(2).map((line) => line.split(','));
+const rowsOf = readFileSync(table, 'utf8')
+  .trim()
+  .split('\n')
+  .slice(2)
+  .map((line) => line.split(','));
 const shifted = (await open(readFileSync(breathed))).pose('left:left=3000mL,right=3900mL').targets();
 assert.equal(shifted.length, rowsOf.length);
 shifted.forEach(({ at, move, mm, expectedError }, i) => {
@@ -154,8 +224,10 @@ for (const readme of [join(packed, 'README.md'), process.env.README]) {
 
 /* The example runs, and prints the volumes of both lungs. */
 writeFileSync(join(folder, 'lungs.mjs'), readFileSync(join(folder, 'node_modules/supine/examples/lungs.mjs')));
-assert.match(execFileSync(process.execPath, ['lungs.mjs', demo, 'prone:rest+500'], { cwd: folder, encoding: 'utf8' }),
-  /vertices; the first is at .*\nleft lung: \d+ mL\nright lung: \d+ mL\n$/);
+assert.match(
+  execFileSync(process.execPath, ['lungs.mjs', demo, 'prone:rest+500'], { cwd: folder, encoding: 'utf8' }),
+  /vertices; the first is at .*\nleft lung: \d+ mL\nright lung: \d+ mL\n$/,
+);
 
 /* In TypeScript, correct use of the package compiles, and each line of wrong use gives one error. */
 const typescript = loadCommon('typescript');
@@ -164,14 +236,25 @@ const lungs = await open(new ArrayBuffer(8), { wasm: new Uint8Array(8) });
 const state: State = { gravity: [0, 1, 0], volume: 'rest+500' };
 const numbers: Float32Array = lungs.pose(state).deformLit();
 const [begin, end]: [number, number] = lungs.lungs.left;
-try { lungs.pose('pron'); } catch (error) { if (error instanceof SupineError && error.status === 'argument') throw error; }
+try { lungs.pose('pron'); } catch (error) {
+  if (error instanceof SupineError && error.status === 'argument') throw error;
+}
 `;
 const wrong = ['lungs.pose(5);', 'lungs.positions = numbers;', 'await open(5);', 'lungs.volumes.left = "much";'];
 const compile = (text) => {
   const file = join(folder, 'use.ts');
   writeFileSync(file, text);
-  const program = typescript.createProgram([file], { strict: true, noEmit: true, target: typescript.ScriptTarget.ES2022, module: typescript.ModuleKind.NodeNext, moduleResolution: typescript.ModuleResolutionKind.NodeNext, types: [] });
-  return typescript.getPreEmitDiagnostics(program).map(({ messageText }) => typescript.flattenDiagnosticMessageText(messageText, '\n'));
+  const program = typescript.createProgram([file], {
+    strict: true,
+    noEmit: true,
+    target: typescript.ScriptTarget.ES2022,
+    module: typescript.ModuleKind.NodeNext,
+    moduleResolution: typescript.ModuleResolutionKind.NodeNext,
+    types: [],
+  });
+  return typescript
+    .getPreEmitDiagnostics(program)
+    .map(({ messageText }) => typescript.flattenDiagnosticMessageText(messageText, '\n'));
 };
 writeFileSync(join(folder, 'package.json'), '{ "type": "module" }');
 assert.deepEqual(compile(use), []);

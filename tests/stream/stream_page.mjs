@@ -14,7 +14,7 @@ function crc64(bytes) {
   let crc = 0n;
   for (const byte of bytes) {
     crc ^= BigInt(byte) << 56n;
-    for (let i = 0; i < 8; ++i) crc = ((crc << 1n) ^ (crc >> 63n ? 0x42F0E1EBA9EA3693n : 0n)) & 0xFFFFFFFFFFFFFFFFn;
+    for (let i = 0; i < 8; ++i) crc = ((crc << 1n) ^ (crc >> 63n ? 0x42f0e1eba9ea3693n : 0n)) & 0xffffffffffffffffn;
   }
   return crc;
 }
@@ -50,22 +50,34 @@ async function view() {
 const viewers = [await view(), await view()];
 const ages = () => Promise.all(viewers.map((page) => page.evaluate(() => window.supineLive.age())));
 assert.deepEqual(await ages(), ['no tracker yet', 'no tracker yet']);
-assert.ok(await viewers[0].evaluate(() => document.body.classList.contains('waiting')), 'not grey before the first pose');
-await viewers[0].evaluate(() => { // count the announcements of a screen reader
+assert.ok(
+  await viewers[0].evaluate(() => document.body.classList.contains('waiting')),
+  'not grey before the first pose',
+);
+await viewers[0].evaluate(() => {
+  // count the announcements of a screen reader
   window.announced = 0;
-  new MutationObserver(() => { window.announced += 1; }).observe(document.getElementById('finding'), { childList: true, subtree: true, characterData: true });
+  new MutationObserver(() => {
+    window.announced += 1;
+  }).observe(document.getElementById('finding'), { childList: true, subtree: true, characterData: true });
 });
 
 /** Wait until every viewer shows this direction of gravity and the server's volume. */
 async function expectGravity(wanted, what) {
   for (const page of viewers) {
-    await page.waitForFunction((g) => {
-      const { state, gravityOf } = window.supine;
-      return Math.hypot(...gravityOf(state.q).map((x, i) => x - g[i])) < 1e-5 && Math.abs(state.depth - 300) < 1e-3;
-    }, wanted).catch(async () => {
-      assert.fail(`${what}: ${await page.evaluate(() => [window.supine.gravityOf(window.supine.state.q), window.supine.state.depth])}`);
-    });
-    await page.waitForFunction((g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 1e-5, wanted);
+    await page
+      .waitForFunction((g) => {
+        const { state, gravityOf } = window.supine;
+        return Math.hypot(...gravityOf(state.q).map((x, i) => x - g[i])) < 1e-5 && Math.abs(state.depth - 300) < 1e-3;
+      }, wanted)
+      .catch(async () => {
+        const shown = () => [window.supine.gravityOf(window.supine.state.q), window.supine.state.depth];
+        assert.fail(`${what}: ${await page.evaluate(shown)}`);
+      });
+    await page.waitForFunction(
+      (g) => Math.hypot(...window.supine.state.moment.gravity.map((x, i) => x - g[i])) < 1e-5,
+      wanted,
+    );
   }
 }
 
@@ -84,7 +96,8 @@ for (const [name, left, back, head, gravity] of lies) {
   }
 }
 for (const text of await ages()) assert.match(text, /^pose \d+\.\d s old$/);
-await viewers[1].waitForFunction(() => Number(/^pose ([\d.]+) s old$/.exec(window.supineLive.age())[1]) >= 1.5); // the age grows
+// The age grows
+await viewers[1].waitForFunction(() => Number(/^pose ([\d.]+) s old$/.exec(window.supineLive.age())[1]) >= 1.5);
 viewers.push(await view()); // a later viewer gets the age of the pose, too
 assert.match(await viewers[2].evaluate(() => window.supineLive.age()), /^pose (1\.[5-9]|[2-9]\.\d|\d\d+) s old$/);
 await viewers.pop().close();
@@ -97,7 +110,11 @@ await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
 
 await viewers[0].waitForFunction(() => /^With gravity along /.test(document.getElementById('finding').textContent));
 // The sentence changed only after each posture had settled, and says nothing of the breath.
-const [announced, sentence, cards] = await viewers[0].evaluate(() => [window.announced, document.getElementById('finding').textContent, [...document.querySelectorAll('#postures small')].map((e) => e.textContent)]);
+const [announced, sentence, cards] = await viewers[0].evaluate(() => [
+  window.announced,
+  document.getElementById('finding').textContent,
+  [...document.querySelectorAll('#postures small')].map((e) => e.textContent),
+]);
 assert.ok(announced >= 1 && announced <= lies.length + 2, `${announced} announcements`);
 assert.ok(!/above/.test(sentence) && cards.every((text) => text !== ''), `${sentence} ${cards}`);
 assert.ok(await viewers[0].evaluate(() => !document.body.classList.contains('waiting')));
@@ -107,8 +124,10 @@ const phone = await context.newCDPSession(viewers[0]);
 assert.ok(await viewers[0].getByRole('button', { name: /tilt/ }).isVisible());
 await viewers[0].getByRole('button', { name: /tilt/ }).click();
 for (const [name, beta, gamma, gravity] of [
-  ['lying on the back', 0, 0, [0, 1, 0]], ['sitting up', 90, 0, [0, 0, -1]],
-  ['half on the side', 0, 60, [Math.sin(Math.PI / 3), 0.5, 0]]]) {
+  ['lying on the back', 0, 0, [0, 1, 0]],
+  ['sitting up', 90, 0, [0, 0, -1]],
+  ['half on the side', 0, 60, [Math.sin(Math.PI / 3), 0.5, 0]],
+]) {
   await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
   await expectGravity(gravity, name);
 }
@@ -121,11 +140,15 @@ assert.equal(elsewhere, 'ECONNREFUSED');
 // A page from another origin may not open the socket.
 const stranger = await context.newPage();
 await stranger.goto('data:text/html,<title>elsewhere</title>');
-const opened = await stranger.evaluate((place) => new Promise((done) => {
-  const socket = new WebSocket(place, 'supine');
-  socket.onopen = () => done(true);
-  socket.onerror = () => done(false);
-}), site.replace('http', 'ws'));
+const opened = await stranger.evaluate(
+  (place) =>
+    new Promise((done) => {
+      const socket = new WebSocket(place, 'supine');
+      socket.onopen = () => done(true);
+      socket.onerror = () => done(false);
+    }),
+  site.replace('http', 'ws'),
+);
 assert.equal(opened, false, 'a page from another origin opened the socket');
 assert.deepEqual(complaints, []);
 tracker.destroy();

@@ -67,17 +67,22 @@ function takeTriangles(name, count) {
 /** Convert RGB colours in hexadecimal digits to RGBA bytes. */
 function readColours(text) {
   const bytes = new Uint8Array((text.length / 6) * 4).fill(255);
-  for (let i = 0; i < text.length; i += 2) bytes[4 * Math.floor(i / 6) + (i % 6) / 2] = parseInt(text.slice(i, i + 2), 16);
+  for (let i = 0; i < text.length; i += 2)
+    bytes[4 * Math.floor(i / 6) + (i % 6) / 2] = parseInt(text.slice(i, i + 2), 16);
   return bytes;
 }
 
 const DTYPES = new Map([
-  [Uint8Array, 'U8'], [Uint16Array, 'U16'], [Int16Array, 'I16'], [Uint32Array, 'U32'],
-  [Float32Array, 'F32'], [Float64Array, 'F64'],
+  [Uint8Array, 'U8'],
+  [Uint16Array, 'U16'],
+  [Int16Array, 'I16'],
+  [Uint32Array, 'U32'],
+  [Float32Array, 'F32'],
+  [Float64Array, 'F64'],
 ]);
 
-/** Return a safetensors file in memory, for open() of supine.js with `seal`. `tensors` has [shape, numbers] by name; those
- * whose numbers are undefined are left out. */
+/** Return a safetensors file in memory, for open() of supine.js with `seal`. `tensors` has [shape, numbers] by name;
+ * those whose numbers are undefined are left out. */
 function basisFile(tensors, metadata) {
   const header = { __metadata__: { ...metadata, checksum: UNSEALED } };
   const kept = Object.entries(tensors).filter(([, [, numbers]]) => numbers !== undefined);
@@ -106,10 +111,14 @@ function takeShared({ modes, band, order, lungBegin }) {
   const second = 9; // harmonics of the volumes that depend on posture
   const shapes = {
     modes: [modes, harmonics, order + 1],
-    volume_linear: [lungs, 3, modes], volume_quadratic: [lungs, 3, modes, modes],
+    volume_linear: [lungs, 3, modes],
+    volume_quadratic: [lungs, 3, modes, modes],
     volume_cubic: [lungs, modes, modes, modes],
-    resting_volume: [lungs, second], full_volume: [lungs, second], volume_range: [27, lungs, 2],
-    simulated_range: [lungs, 2], simulated_limits: [lungs, 2, second],
+    resting_volume: [lungs, second],
+    full_volume: [lungs, second],
+    volume_range: [27, lungs, 2],
+    simulated_range: [lungs, 2],
+    simulated_limits: [lungs, 2, second],
   };
   const taken = Object.entries(shapes).map(([name, shape]) => [name, [shape, takeTensor(name, Float64Array)]]);
   const shares = takeTensor('simulated_shares', Float64Array);
@@ -134,7 +143,9 @@ const lungsOfVertices = (begin) => {
 
 /** Return what the files in memory state about themselves: volumes of the lungs as in the file that was exported. */
 const metadataOf = (basis, metadata) => ({
-  ...metadata, content: metadata.content ?? 'page', reference_volume_ml: basis.references.join(),
+  ...metadata,
+  content: metadata.content ?? 'page',
+  reference_volume_ml: basis.references.join(),
 });
 
 /** Take the vertices of the surface, and return the tensors of its basis. */
@@ -143,12 +154,16 @@ function takeSurface(basis) {
   basis.surface = takePlaces('vertices', n, basis.placeUnit, basis.middle);
   basis.corners = takeTriangles('triangles', basis.triangles);
   const tensors = {
-    vertices: [[n, 3], basis.surface], triangles: [[basis.triangles, 3], basis.corners],
+    vertices: [[n, 3], basis.surface],
+    triangles: [[basis.triangles, 3], basis.corners],
     lung: [[n], lungsOfVertices(basis.lungBegin)],
   };
   if (!vector) {
     const directions = takeCounts('direction', n, 4, 'OCTAHEDRAL');
-    basis.direction = Float32Array.from({ length: 3 * n }, (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767);
+    basis.direction = Float32Array.from(
+      { length: 3 * n },
+      (_, i) => directions[4 * Math.floor(i / 3) + (i % 3)] / 32767,
+    );
     tensors.direction = [[n, 3], basis.direction];
   }
   if (clusters > 0) {
@@ -173,7 +188,9 @@ function findBoxes(basis) {
   basis.lungNames = Array.from({ length: basis.lungs }, (_, i) => (names[i] ? `${names[i]} lung` : `lung ${i}`));
   basis.lungBoxes = basis.lungNames.map((_, lung) => {
     const [begin, end] = [basis.lungBegin[lung], basis.lungBegin[lung + 1]];
-    return boundsOf(Array.from({ length: end - begin }, (_, i) => basis.surface.subarray(3 * (begin + i), 3 * (begin + i) + 3)));
+    return boundsOf(
+      Array.from({ length: end - begin }, (_, i) => basis.surface.subarray(3 * (begin + i), 3 * (begin + i) + 3)),
+    );
   });
   const corner = (end, most) => [0, 1, 2].map((axis) => most(...basis.lungBoxes.map((box) => box[end][axis])));
   const [low, high] = [corner('low', Math.min), corner('high', Math.max)];

@@ -4,20 +4,61 @@
 
 /** Outline of the torso: height of the section's centre above the centre of the lungs, and its half widths to the sides
  * and to front and back, as multiples of half the lungs' extent along each axis. */
-const TORSO = [[-4.4, 1.2, 1.16], [-3, 1.2, 1.14], [-2, 1.1, 1.08], [-1, 1.16, 1.18], [0, 1.3, 1.22], [0.6, 1.45, 1.14], [1, 1.42, 0.94], [1.25, 0.95, 0.72], [1.45, 0.44, 0.54], [1.7, 0.4, 0.52], [1.92, 0.46, 0.7], [2.3, 0.56, 0.84], [2.65, 0.52, 0.78], [2.9, 0.34, 0.5], [3, 0.001, 0.001]];
+const TORSO = [
+  [-4.4, 1.2, 1.16],
+  [-3, 1.2, 1.14],
+  [-2, 1.1, 1.08],
+  [-1, 1.16, 1.18],
+  [0, 1.3, 1.22],
+  [0.6, 1.45, 1.14],
+  [1, 1.42, 0.94],
+  [1.25, 0.95, 0.72],
+  [1.45, 0.44, 0.54],
+  [1.7, 0.4, 0.52],
+  [1.92, 0.46, 0.7],
+  [2.3, 0.56, 0.84],
+  [2.65, 0.52, 0.78],
+  [2.9, 0.34, 0.5],
+  [3, 0.001, 0.001],
+];
 
 /** Points of the left arm from the shoulder to the fingers, in the same units, beside the body and raised beside the
  * head, and the arm's radius there, in half widths of the lungs. */
-const ARM = { beside: [[1.2, 0, 0.72], [1.42, 0, 0.5], [1.52, 1, -0.3], [1.54, 1, -1.1], [1.52, 1, -1.9], [1.5, 1, -2.7], [1.48, 1, -3.3]],
-  raised: [[1.2, 0, 0.72], [1.1, -0.2, 1], [1.06, -0.4, 1.5], [1.08, -0.5, 2], [1.12, -0.55, 2.5], [1.16, -0.55, 2.9], [1.2, -0.55, 3.2]],
-  radius: [0.02, 0.4, 0.36, 0.31, 0.29, 0.22, 0.02] };
+const ARM = {
+  beside: [
+    [1.2, 0, 0.72],
+    [1.42, 0, 0.5],
+    [1.52, 1, -0.3],
+    [1.54, 1, -1.1],
+    [1.52, 1, -1.9],
+    [1.5, 1, -2.7],
+    [1.48, 1, -3.3],
+  ],
+  raised: [
+    [1.2, 0, 0.72],
+    [1.1, -0.2, 1],
+    [1.06, -0.4, 1.5],
+    [1.08, -0.5, 2],
+    [1.12, -0.55, 2.5],
+    [1.16, -0.55, 2.9],
+    [1.2, -0.55, 3.2],
+  ],
+  radius: [0.02, 0.4, 0.36, 0.31, 0.29, 0.22, 0.02],
+};
 
 /** Return rows of numbers with `count` - 1 rows between each two, on a Catmull-Rom spline. */
-const smooth = (rows, count) => Array.from({ length: (rows.length - 1) * count + 1 }, (_, i) => {
-  const [at, t] = [Math.min(Math.floor(i / count), rows.length - 2), i / count - Math.min(Math.floor(i / count), rows.length - 2)];
-  const [a, b, c, d] = [at - 1, at, at + 1, at + 2].map((j) => rows[Math.max(0, Math.min(rows.length - 1, j))]);
-  return b.map((x, k) => x + 0.5 * t * (c[k] - a[k] + t * (2 * a[k] - 5 * x + 4 * c[k] - d[k] + t * (3 * (x - c[k]) + d[k] - a[k]))));
-});
+const smooth = (rows, count) =>
+  Array.from({ length: (rows.length - 1) * count + 1 }, (_, i) => {
+    const [at, t] = [
+      Math.min(Math.floor(i / count), rows.length - 2),
+      i / count - Math.min(Math.floor(i / count), rows.length - 2),
+    ];
+    const [a, b, c, d] = [at - 1, at, at + 1, at + 2].map((j) => rows[Math.max(0, Math.min(rows.length - 1, j))]);
+    return b.map(
+      (x, k) =>
+        x + 0.5 * t * (c[k] - a[k] + t * (2 * a[k] - 5 * x + 4 * c[k] - d[k] + t * (3 * (x - c[k]) + d[k] - a[k]))),
+    );
+  });
 
 /** Return the way down across the body, a unit vector [x, y, 0] in the patient's axes; null if the patient stands. */
 function downOf(gravity) {
@@ -25,17 +66,23 @@ function downOf(gravity) {
   return flat > 0.4 ? [gravity[0] / flat, gravity[1] / flat, 0] : null;
 }
 
-/** Return the points of both arms, from shoulder to fingers, relative to the centre of the torso, and their radii: rows of
- * x, y, z, radius, mm. An arm beside the body lies on the table. */
+/** Return the points of both arms, from shoulder to fingers, relative to the centre of the torso, and their radii:
+ * rows of x, y, z, radius, mm. An arm beside the body lies on the table. */
 function armsOf({ half }, down) {
   const deepest = Math.max(...TORSO.map(([, , y]) => y)) * half[1];
-  const raised = (side) => (down ? Math.min(1, Math.max(0, (side * down[0] - 0.4) / 0.5)) : 0); // 0: beside the body, 1: raised
-  return [1, -1].map((side) => smooth(ARM.beside.map((beside, i) => {
-    const radius = ARM.radius[i] * half[0];
-    const lying = [beside[0] * half[0], beside[1] * (down ? down[1] * (deepest - radius) : 0), beside[2] * half[2]];
-    const [x, y, z] = lying.map((from, axis) => from + raised(side) * (ARM.raised[i][axis] * half[axis] - from));
-    return [side * x, y, z, radius];
-  }), 4).map(([x, y, z, radius]) => [x, y, z, Math.max(radius, 0.01)]));
+  // 0: beside the body, 1: raised
+  const raised = (side) => (down ? Math.min(1, Math.max(0, (side * down[0] - 0.4) / 0.5)) : 0);
+  return [1, -1].map((side) =>
+    smooth(
+      ARM.beside.map((beside, i) => {
+        const radius = ARM.radius[i] * half[0];
+        const lying = [beside[0] * half[0], beside[1] * (down ? down[1] * (deepest - radius) : 0), beside[2] * half[2]];
+        const [x, y, z] = lying.map((from, axis) => from + raised(side) * (ARM.raised[i][axis] * half[axis] - from));
+        return [side * x, y, z, radius];
+      }),
+      4,
+    ).map(([x, y, z, radius]) => [x, y, z, Math.max(radius, 0.01)]),
+  );
 }
 
 /** Return the sections of the torso: rows of TORSO, and others between them. */

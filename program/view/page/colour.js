@@ -28,11 +28,19 @@ const KINDS = {
 
 /** Return the RGBA bytes of a diverging colour map: blue below its middle, orange above. */
 function divergingMap() {
-  const stops = [[19, 66, 138], [113, 161, 214], [243, 242, 238], [230, 147, 92], [140, 45, 4]];
+  const stops = [
+    [19, 66, 138],
+    [113, 161, 214],
+    [243, 242, 238],
+    [230, 147, 92],
+    [140, 45, 4],
+  ];
   return Uint8Array.from({ length: 1024 }, (_, i) => {
     const at = (Math.floor(i / 4) / 255) * 4;
     const below = Math.min(3, Math.floor(at));
-    return i % 4 === 3 ? 255 : Math.round(stops[below][i % 4] + (at - below) * (stops[below + 1][i % 4] - stops[below][i % 4]));
+    return i % 4 === 3
+      ? 255
+      : Math.round(stops[below][i % 4] + (at - below) * (stops[below + 1][i % 4] - stops[below][i % 4]));
   });
 }
 

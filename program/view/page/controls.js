@@ -74,7 +74,10 @@ function onSlider(id, act) {
     if (Number.isFinite(value)) act(Math.max(Number(slider.min), Math.min(Number(slider.max), value)));
   };
   $(id).addEventListener('input', () => take($(id)));
-  for (const [type, then] of [['change', take], ['blur', () => {}]]) {
+  for (const [type, then] of [
+    ['change', take],
+    ['blur', () => {}],
+  ]) {
     $(`${id}-number`).addEventListener(type, () => {
       $(id).written = ''; // makes setSlider replace a typed text that is not a number or is out of range
       then($(`${id}-number`));
@@ -111,13 +114,18 @@ function drawLegend(kind, range, title, colours) {
   const size = range.end - range.begin;
   const first = Math.ceil(range.begin / range.step - 1e-9);
   const count = Math.floor(range.end / range.step + 1e-9) - first;
-  $('ticks').replaceChildren(...Array.from({ length: count + 1 }, (_, i) => {
-    const tick = document.createElement('span');
-    tick.style.left = `${(100 * ((first + i) * range.step - range.begin)) / size}%`;
-    tick.textContent = plain((first + i) * range.step);
-    return tick;
-  }));
-  for (const [id, value] of [['range-begin', range.begin], ['range-end', range.end]]) {
+  $('ticks').replaceChildren(
+    ...Array.from({ length: count + 1 }, (_, i) => {
+      const tick = document.createElement('span');
+      tick.style.left = `${(100 * ((first + i) * range.step - range.begin)) / size}%`;
+      tick.textContent = plain((first + i) * range.step);
+      return tick;
+    }),
+  );
+  for (const [id, value] of [
+    ['range-begin', range.begin],
+    ['range-end', range.end],
+  ]) {
     if (document.activeElement !== $(id)) $(id).value = Number(value.toPrecision(4));
   }
   write('range-unit', KINDS[kind].unit);

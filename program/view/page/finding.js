@@ -10,28 +10,39 @@ function areasOf({ surface, corners, vertices }) {
   const areas = new Float32Array(vertices);
   for (let t = 0; t < corners.length; t += 3) {
     const [a, b, c] = [0, 1, 2].map((i) => surface.subarray(3 * corners[t + i], 3 * corners[t + i] + 3));
-    const piece = Math.hypot(...cross([0, 1, 2].map((i) => b[i] - a[i]), [0, 1, 2].map((i) => c[i] - a[i])));
+    const piece = Math.hypot(
+      ...cross(
+        [0, 1, 2].map((i) => b[i] - a[i]),
+        [0, 1, 2].map((i) => c[i] - a[i]),
+      ),
+    );
     for (let i = 0; i < 3; ++i) areas[corners[t + i]] += piece;
   }
   return areas;
 }
 
-/** Return statistics of the distance of the surface's vertices between positions `after` and `before`, mm: the mean over
- * the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest), the largest, and the vertex where
- * it is. */
+/** Return statistics of the distance of the surface's vertices between positions `after` and `before`, mm: the mean
+ * over the area, the 95th percentile (rounded up to a multiple of 1/2000 of the largest), the largest, and the vertex
+ * where it is. */
 function distancesOf(basis, after, before) {
   basis.areas ??= areasOf(basis);
   const { areas } = basis;
   const far = new Float32Array(basis.vertices);
   let [sum, area, at] = [0, 0, 0];
   for (let v = 0; v < far.length; ++v) {
-    far[v] = Math.hypot(after[3 * v] - before[3 * v], after[3 * v + 1] - before[3 * v + 1], after[3 * v + 2] - before[3 * v + 2]);
+    far[v] = Math.hypot(
+      after[3 * v] - before[3 * v],
+      after[3 * v + 1] - before[3 * v + 1],
+      after[3 * v + 2] - before[3 * v + 2],
+    );
     sum += areas[v] * far[v];
     area += areas[v];
     if (far[v] > far[at]) at = v;
   }
   const bins = new Float64Array(2001);
-  far.forEach((mm, v) => { bins[Math.ceil((2000 * mm) / (far[at] || 1))] += areas[v]; });
+  far.forEach((mm, v) => {
+    bins[Math.ceil((2000 * mm) / (far[at] || 1))] += areas[v];
+  });
   let [bin, within] = [0, bins[0]];
   while (within < 0.95 * area && bin < 2000) within += bins[++bin];
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at };
@@ -45,8 +56,8 @@ function surfaceError({ library, metadata }, now, from) {
   return Math.sqrt(sigma.reduce((sum, x) => sum + x * x, 0) / sigma.length);
 }
 
-/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, the expected error
- * of the surface, mm, or null, and the result of targetsBetween. */
+/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, the expected
+ * error of the surface, mm, or null, and the result of targetsBetween. */
 function movedBetween(basis, now, from) {
   const distances = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
   const targets = basis.inside ? targetsBetween(basis.inside, now, from) : [];
@@ -75,15 +86,30 @@ const withinWords = (error) => `within its error of ${error.toFixed(1)}`;
  * error. Targets come before anatomy. */
 function firstTarget(inside, moved) {
   const ratios = moved.targets.map(({ mm, error }, part) => [inside.anatomy.includes(part) ? 0 : 1, mm / (error ?? 1)]);
-  return ratios.reduce((best, [kind, ratio], part) => (kind > ratios[best][0] || (kind === ratios[best][0] && ratio > ratios[best][1]) ? part : best), 0);
+  return ratios.reduce(
+    (best, [kind, ratio], part) =>
+      kind > ratios[best][0] || (kind === ratios[best][0] && ratio > ratios[best][1]) ? part : best,
+    0,
+  );
 }
 
 /** Return a displacement in words, with at most `most` directions and the largest first: "12 to the feet, 7 to the
  * front". With gravity, a direction along it is marked "(up)" or "(down)". */
 function wayWords(move, most, gravity) {
-  const ways = [['left', 'right'], ['back', 'front'], ['head', 'feet']];
-  const parts = move.map((x, axis) => ({ mm: Math.round(Math.abs(x)), way: ways[axis][x > 0 ? 0 : 1], down: gravity ? Math.sign(x) * gravity[axis] : 0 }));
-  const words = parts.filter(({ mm }) => mm > 0).sort((a, b) => b.mm - a.mm).slice(0, most)
+  const ways = [
+    ['left', 'right'],
+    ['back', 'front'],
+    ['head', 'feet'],
+  ];
+  const parts = move.map((x, axis) => ({
+    mm: Math.round(Math.abs(x)),
+    way: ways[axis][x > 0 ? 0 : 1],
+    down: gravity ? Math.sign(x) * gravity[axis] : 0,
+  }));
+  const words = parts
+    .filter(({ mm }) => mm > 0)
+    .sort((a, b) => b.mm - a.mm)
+    .slice(0, most)
     .map(({ mm, way, down }) => `${mm} to the ${way}${Math.abs(down) > 0.9 ? ` (${down > 0 ? 'down' : 'up'})` : ''}`);
   return words.join(', ') || 'less than 1 in any direction';
 }
@@ -93,7 +119,8 @@ function whereWords(gravity) {
   const text = postureText(gravity);
   const [, name, roll, tilt] = /^([a-z]+)(?:@(-?\d+))?([+-]\d+)?$/.exec(text) ?? [];
   if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')}`;
-  const lying = name === 'left' || name === 'right' ? `Lying on the ${name} side` : `${name[0].toUpperCase()}${name.slice(1)}`;
+  const lying =
+    name === 'left' || name === 'right' ? `Lying on the ${name} side` : `${name[0].toUpperCase()}${name.slice(1)}`;
   const rolled = roll ? `, rolled ${Math.abs(roll)} degrees to the ${roll > 0 ? 'left' : 'right'}` : '';
   return `${lying}${rolled}${tilt ? `, ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'}` : ''}`;
 }
@@ -104,24 +131,65 @@ function spotWords(basis, vertex) {
   const { centre, half } = basis.lungBoxes[lung];
   const [x, y, z] = centre.map((c, i) => (basis.surface[3 * vertex + i] - c) / half[i]);
   const outwards = centre[0] < basis.lungBoxes.reduce((sum, box) => sum + box.centre[0] / basis.lungs, 0) ? -x : x;
-  const spots = [[outwards, 'on the outer side'], [-outwards, 'on the inner side'], [y, 'at the back'], [-y, 'at the front'], [z, 'at the apex'], [-z, 'at the base']];
+  const spots = [
+    [outwards, 'on the outer side'],
+    [-outwards, 'on the inner side'],
+    [y, 'at the back'],
+    [-y, 'at the front'],
+    [z, 'at the apex'],
+    [-z, 'at the base'],
+  ];
   return `${spots.reduce((most, spot) => (spot[0] > most[0] ? spot : most))[1]} of the ${basis.lungNames[lung]}`;
 }
 
+/** Return how far points lie from their computed place, for an expected error in mm. */
+function spreadWords(error, samePosture) {
+  const [half, most] = [0.9, 1.8].map((factor) => (factor * error).toFixed(0));
+  const extrapolated = samePosture ? '' : '; for a change of posture the error is an extrapolation';
+  return `Half of all points lie within ${half} mm of the computed place, 95 % within ${most} mm${extrapolated}.`;
+}
+
 /** Return the sentence on a state of the lungs as {before, told, after, error, meaning}; `told`, which the page
- * emphasises, is empty if the change is within its expected error. `target` is the one of targetsBetween, or null if the
- * sentence is about the surface, and `above` a phrase such as "500 mL above rest", or empty. */
+ * emphasises, is empty if the change is within its expected error. `target` is the one of targetsBetween, or null if
+ * the sentence is about the surface, and `above` a phrase such as "500 mL above rest", or empty. */
 function sentenceOf(basis, moved, target, gravity, above) {
   const { name } = moved.from;
   const where = `${whereWords(gravity)}${above && `, ${above}`}, `;
   const who = target ? target.name : 'the surface';
   const { mm, error } = target ?? { mm: moved.mean, error: moved.error };
-  if (moved.largest < 0.05) return { before: `This is ${name}, from which displacements are measured.`, told: '', after: '', error: '', meaning: '' };
+  if (moved.largest < 0.05)
+    return {
+      before: `This is ${name}, from which displacements are measured.`,
+      told: '',
+      after: '',
+      error: '',
+      meaning: '',
+    };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
-  const half = error === null ? '' : `Half of all points lie within ${(0.9 * error).toFixed(0)} mm of the computed place, 95 % within ${(1.8 * error).toFixed(0)} mm${near(gravity, moved.from.gravity) ? '' : '; for a change of posture the error is an extrapolation'}.`;
-  if (!isTold({ mm, error })) return { before: `${where}${who} moves ${mm.toFixed(1)} mm from ${name}, ${withinWords(error)}: no change that the model can tell.`, told: '', after: '', error: '', meaning: half };
-  const [told, after] = target ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`] : [`moves ${mm.toFixed(1)} mm on average`, `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`];
-  return { before: where, told: `${who} ${told}`, after: ` from ${name}${after}${stated && '; '}`, error: stated && `${stated}.`, meaning: half };
+  const half = error === null ? '' : spreadWords(error, near(gravity, moved.from.gravity));
+  if (!isTold({ mm, error }))
+    return {
+      before:
+        `${where}${who} moves ${mm.toFixed(1)} mm from ${name}, ${withinWords(error)}: ` +
+        'no change that the model can tell.',
+      told: '',
+      after: '',
+      error: '',
+      meaning: half,
+    };
+  const [told, after] = target
+    ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`]
+    : [
+        `moves ${mm.toFixed(1)} mm on average`,
+        `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`,
+      ];
+  return {
+    before: where,
+    told: `${who} ${told}`,
+    after: ` from ${name}${after}${stated && '; '}`,
+    error: stated && `${stated}.`,
+    meaning: half,
+  };
 }
 
 const errorText = (mm) => `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`;
@@ -131,12 +199,19 @@ function writeSentence(element, sentence) {
   const text = ['before', 'told', 'after', 'error'].map((key) => sentence[key]).join('');
   if (element.written === text) return;
   element.written = text;
-  element.replaceChildren(sentence.before, ...[['em', sentence.told], ['', sentence.after], ['small', sentence.error]].map(([tag, words]) => {
-    if (!tag) return words;
-    const part = document.createElement(tag);
-    part.textContent = words;
-    return part;
-  }));
+  element.replaceChildren(
+    sentence.before,
+    ...[
+      ['em', sentence.told],
+      ['', sentence.after],
+      ['small', sentence.error],
+    ].map(([tag, words]) => {
+      if (!tag) return words;
+      const part = document.createElement(tag);
+      part.textContent = words;
+      return part;
+    }),
+  );
 }
 
 /** Return the second line of a posture's card: "13.9 mm, 12 to the feet", or "3.1 mm, error 5.4". */
@@ -153,11 +228,13 @@ class Holds {
     this.rows = lungNames.map(() => {
       const row = document.createElement('div');
       row.className = 'hold';
-      const parts = Object.fromEntries(['who', 'bar', 'band', 'was', 'now', 'ml'].map((name) => {
-        const part = document.createElement(['who', 'ml'].includes(name) ? 'span' : 'i');
-        part.className = name;
-        return [name, part];
-      }));
+      const parts = Object.fromEntries(
+        ['who', 'bar', 'band', 'was', 'now', 'ml'].map((name) => {
+          const part = document.createElement(['who', 'ml'].includes(name) ? 'span' : 'i');
+          part.className = name;
+          return [name, part];
+        }),
+      );
       parts.bar.append(parts.band, parts.was, parts.now);
       row.append(parts.who, parts.bar, parts.ml);
       parent.append(row);
@@ -165,9 +242,9 @@ class Holds {
     });
   }
 
-  /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from which
-   * displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume at rest
-   * has a normal distribution; the range is one standard deviation to either side. */
+  /** Show the volume of each lung, mL: `held` now, `depth` above rest in all lungs, and `before` in the state from
+   * which displacements are measured. `heights`, mm, tell which lung is uppermost. The logarithm of an assumed volume
+   * at rest has a normal distribution; the range is one standard deviation to either side. */
   show({ library, lungNames, references, metadata }, held, depth, before, heights) {
     const simulated = library.tensor('simulated_range')?.data;
     const apart = heights.length === 2 && Math.abs(heights[0] - heights[1]) > 30; // one lung is > 30 mm higher
@@ -179,7 +256,9 @@ class Holds {
       const most = references[lung] + Math.max(0, simulated?.[2 * lung + 1] ?? 0);
       const at = (volume) => `${Math.max(0, Math.min(100, (100 * volume) / most))}%`;
       who.textContent = `${lungNames[lung]}${apart ? ` (${heights[lung] > heights[1 - lung] ? 'up' : 'down'})` : ''}`;
-      ml.textContent = `${Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `}${to.toFixed(0)} mL${known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`}`;
+      const earlier = Math.abs(to - from) < 0.5 ? '' : `${from.toFixed(0)} \u2192 `;
+      const range = known ? '' : `, range ${ends[0].toFixed(0)} to ${ends[1].toFixed(0)}`;
+      ml.textContent = `${earlier}${to.toFixed(0)} mL${range}`;
       was.style.left = at(from);
       now.style.left = at(to);
       band.hidden = known;

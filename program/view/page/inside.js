@@ -15,9 +15,14 @@ async function takeInside(basis, shared, options) {
   const corners = takeTriangles('inside-triangles', inside.triangles);
   const rigid = Uint32Array.from(inside.rigidRanges);
   const tensors = {
-    vertices: [[n, 3], inside.places], triangles: [[inside.triangles, 3], corners], lung: [[n], lungsOfVertices(inside.lungBegin)],
+    vertices: [[n, 3], inside.places],
+    triangles: [[inside.triangles, 3], corners],
+    lung: [[n], lungsOfVertices(inside.lungBegin)],
     coefficients: [[n, 3, k], coefficientsFrom(inside.counts, n, 3, k, inside.unit)],
-    part: [[n], inside.of], ...namesOf(inside), ...shared, ...takeSquares(basis, 'inside-'),
+    part: [[n], inside.of],
+    ...namesOf(inside),
+    ...shared,
+    ...takeSquares(basis, 'inside-'),
     rigid: [[rigid.length / 2, 2], rigid.length ? rigid : undefined],
   };
   inside.library = await open(basisFile(tensors, metadataOf(basis, inside.metadata)), options);
@@ -31,29 +36,33 @@ function namesOf({ names, anatomy }) {
   return { names: [[text.length], text], anatomy: [[names.length], large] };
 }
 
-/** Return the vertices in the order in which they are drawn: points before meshes, and targets before anatomy, so that each
- * kind needs one draw call. */
+/** Return the vertices in the order in which they are drawn: points before meshes, and targets before anatomy, so that
+ * each kind needs one draw call. */
 function drawnOrder(inside, corners, isLarge) {
   const { vertices: n, rigidRanges } = inside;
   const meshed = new Uint8Array(n);
   for (const corner of corners) meshed[corner] = 1;
-  for (let i = 0; i < rigidRanges.length; i += 2) meshed.fill(1, rigidRanges[i], rigidRanges[i + 1]); // sorting must not split a rigid part
+  // Sorting must not split a rigid part
+  for (let i = 0; i < rigidRanges.length; i += 2) meshed.fill(1, rigidRanges[i], rigidRanges[i + 1]);
   const order = Uint32Array.from({ length: n }, (_, i) => i);
   order.sort((a, b) => meshed[a] - meshed[b] || isLarge(a) - isLarge(b) || a - b);
   inside.points = n - meshed.reduce((sum, x) => sum + x, 0);
-  inside.balls = order.subarray(0, inside.points).reduce((sum, vertex) => sum + 1 - isLarge(vertex), 0); // points of targets
+  // Points of targets
+  inside.balls = order.subarray(0, inside.points).reduce((sum, vertex) => sum + 1 - isLarge(vertex), 0);
   return order;
 }
 
-/** Sort vertices and meshes for drawing. `order` has the library's index of each vertex drawn, `members` the vertices drawn
- * of each part, and `rigid` the parts that keep their shape. */
+/** Sort vertices and meshes for drawing. `order` has the library's index of each vertex drawn, `members` the vertices
+ * drawn of each part, and `rigid` the parts that keep their shape. */
 function sortInside(inside, corners) {
   const { vertices: n, of, places } = inside;
   const large = new Set(inside.anatomy);
   const isLarge = (vertex) => Number(large.has(of[vertex]));
   const order = drawnOrder(inside, corners, isLarge);
   const rank = new Uint32Array(n);
-  order.forEach((from, to) => { rank[from] = to; });
+  order.forEach((from, to) => {
+    rank[from] = to;
+  });
   inside.order = order;
   inside.reference = new Float32Array(4 * n); // reference position, mm, and lung
   inside.part = new Float32Array(n);
@@ -75,8 +84,12 @@ function sortInside(inside, corners) {
   inside.corners = Uint32Array.from(meshes.flat());
   inside.targetCorners = meshes[0].length;
   const begin = (i) => meshes.slice(0, i + 1).reduce((sum, { length }) => sum + length, 0);
-  inside.shells = inside.anatomy.map((part, i) => (
-    { part, colour: i % ANATOMY_COLOURS.length, begin: begin(i), count: meshes[i + 1].length }));
+  inside.shells = inside.anatomy.map((part, i) => ({
+    part,
+    colour: i % ANATOMY_COLOURS.length,
+    begin: begin(i),
+    count: meshes[i + 1].length,
+  }));
   inside.shells = inside.shells.filter(({ count }) => count > 0);
   inside.normals = normalsOf(inside);
 }
@@ -87,7 +100,10 @@ function normalsOf({ reference, vertices, corners }) {
   const at = (v) => [...reference.subarray(4 * v, 4 * v + 3)];
   for (let t = 0; t < corners.length; t += 3) {
     const [a, b, c] = [at(corners[t]), at(corners[t + 1]), at(corners[t + 2])];
-    const n = cross(b.map((x, i) => x - a[i]), c.map((x, i) => x - a[i]));
+    const n = cross(
+      b.map((x, i) => x - a[i]),
+      c.map((x, i) => x - a[i]),
+    );
     for (let j = 0; j < 3; ++j) for (let i = 0; i < 3; ++i) normals[3 * corners[t + j] + i] += n[i];
   }
   for (let i = 0; i < normals.length; i += 3) {
@@ -104,22 +120,28 @@ function insidePlace({ library, order }, moment, vertex) {
 }
 
 /** Return the positions of a part's vertices at a moment, mm. */
-const insidePlaces = (inside, moment, part) => inside.members[part].map((vertex) => insidePlace(inside, moment, vertex));
+const insidePlaces = (inside, moment, part) =>
+  inside.members[part].map((vertex) => insidePlace(inside, moment, vertex));
 
 /** Return the CSS colour of a part that is anatomy; undefined for a target. */
-const anatomyColour = ({ anatomy }, part) => (anatomy.includes(part) ? ANATOMY_COLOURS[anatomy.indexOf(part) % ANATOMY_COLOURS.length] : undefined);
+const anatomyColour = ({ anatomy }, part) =>
+  anatomy.includes(part) ? ANATOMY_COLOURS[anatomy.indexOf(part) % ANATOMY_COLOURS.length] : undefined;
 
 /** Return the positions of all vertices of anatomy, mm, in the state `moment` of the lungs; 0 for those of targets. */
 function anatomyPlaces(inside, moment) {
   const places = new Float32Array(3 * inside.vertices);
-  for (const { part } of inside.shells) insidePlaces(inside, moment, part).forEach((place, i) => places.set(place, 3 * inside.members[part][i]));
+  for (const { part } of inside.shells)
+    insidePlaces(inside, moment, part).forEach((place, i) => places.set(place, 3 * inside.members[part][i]));
   return places;
 }
 
-/** Return the lines along which the meshes of anatomy cross the plane at `at` mm on an axis: for each mesh its colour and
- * the result of linesAcross. `places` is the result of anatomyPlaces. */
-const anatomyLines = ({ shells, corners, vertices }, places, axis, at) => shells.map(({ colour, begin, count }) => (
-  { colour: ANATOMY_COLOURS[colour], lines: linesAcross({ corners: corners.subarray(begin, begin + count), vertices }, places, axis, at) }));
+/** Return the lines along which the meshes of anatomy cross the plane at `at` mm on an axis: for each mesh its colour
+ * and the result of linesAcross. `places` is the result of anatomyPlaces. */
+const anatomyLines = ({ shells, corners, vertices }, places, axis, at) =>
+  shells.map(({ colour, begin, count }) => ({
+    colour: ANATOMY_COLOURS[colour],
+    lines: linesAcross({ corners: corners.subarray(begin, begin + count), vertices }, places, axis, at),
+  }));
 
 /** Return the vertex of a part that is nearest to the position `place`, mm. */
 function insideNearest(inside, part, moment, place) {
@@ -150,7 +172,12 @@ class TargetTable {
     const words = $('inside-find').value.trim().toLowerCase();
     const found = this.inside.names.flatMap((name, part) => (name.toLowerCase().includes(words) ? [part] : []));
     const { length } = this.inside.names;
-    write('inside-count', found.length === length && length <= ROWS_SHOWN ? '' : `listed: ${Math.min(found.length, ROWS_SHOWN)} of ${length}`);
+    write(
+      'inside-count',
+      found.length === length && length <= ROWS_SHOWN
+        ? ''
+        : `listed: ${Math.min(found.length, ROWS_SHOWN)} of ${length}`,
+    );
     this.rows = found.slice(0, ROWS_SHOWN).map((part) => this.row(part));
     $('inside-rows').replaceChildren(...this.rows.map(({ row }) => row));
     this.press();
@@ -158,7 +185,9 @@ class TargetTable {
   }
 
   row(part) {
-    const [row, head, button, ...cells] = ['tr', 'th', 'button', 'td', 'td', 'td'].map((tag) => document.createElement(tag));
+    const [row, head, button, ...cells] = ['tr', 'th', 'button', 'td', 'td', 'td'].map((tag) =>
+      document.createElement(tag),
+    );
     head.scope = 'row';
     button.type = 'button';
     button.textContent = this.inside.names[part] || '(no name)';
@@ -186,8 +215,18 @@ class TargetTable {
       const target = moved.targets[part];
       const told = isTold(target);
       row.classList.toggle('untold', !told);
-      const texts = [`${target.mm.toFixed(1)} mm`, moved.largest < 0.05 ? 'the reference' : told ? wayWords(target.move, 3, moved.now.gravity) : withinWords(target.error), target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`];
-      cells.forEach((cell, i) => { if (cell.textContent !== texts[i]) cell.textContent = texts[i]; });
+      const texts = [
+        `${target.mm.toFixed(1)} mm`,
+        moved.largest < 0.05
+          ? 'the reference'
+          : told
+            ? wayWords(target.move, 3, moved.now.gravity)
+            : withinWords(target.error),
+        target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`,
+      ];
+      cells.forEach((cell, i) => {
+        if (cell.textContent !== texts[i]) cell.textContent = texts[i];
+      });
     }
   }
 }

@@ -10,24 +10,41 @@ const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 function linkOf(state) {
   const { camera } = state;
   const all = {
-    posture: postureText(gravityOf(state.goal)), depth: round(state.depth, 1), tidal: round(state.tidal, 1),
-    colour: state.kind, reference: postureText(gravityOf(state.pinnedQ)), room: state.room ? '' : '0',
+    posture: postureText(gravityOf(state.goal)),
+    depth: round(state.depth, 1),
+    tidal: round(state.tidal, 1),
+    colour: state.kind,
+    reference: postureText(gravityOf(state.pinnedQ)),
+    room: state.room ? '' : '0',
     show: SHOWN.filter((name) => state[name]).join('.') || 'nothing',
     lungs: state.opacity.every((x) => x === state.usualOpacity()) ? '' : state.opacity.join(':'),
     cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
     range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
-    camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])].map((x) => round(x)).join(':'),
-    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '', probes: state.probes.join('.'), target: state.picked ? String(state.chosen) : '',
-    since: state.basis.froms.length > 1 ? String(state.basis.froms.indexOf(state.from)) : '', inside: state.basis.inside && !state.inside ? '0' : '',
+    camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])]
+      .map((x) => round(x))
+      .join(':'),
+    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '',
+    probes: state.probes.join('.'),
+    target: state.picked ? String(state.chosen) : '',
+    since: state.basis.froms.length > 1 ? String(state.basis.froms.indexOf(state.from)) : '',
+    inside: state.basis.inside && !state.inside ? '0' : '',
   };
-  return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== '')).toString().replaceAll('%3A', ':').replaceAll('%2B', '%2b');
+  return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== ''))
+    .toString()
+    .replaceAll('%3A', ':')
+    .replaceAll('%2B', '%2b');
 }
 
 /** Set the view from the fragment of a URL; ignore invalid values. */
 function takeLink(text, state) {
   const link = new URLSearchParams(text.replace(/^#/, ''));
-  const numbers = (name, separator = ':') => (link.get(name) ?? '').split(separator).filter((x) => x !== '').map(Number);
-  const within = (value, low, high, otherwise) => (Number.isFinite(value) && value >= low && value <= high ? value : otherwise);
+  const numbers = (name, separator = ':') =>
+    (link.get(name) ?? '')
+      .split(separator)
+      .filter((x) => x !== '')
+      .map(Number);
+  const within = (value, low, high, otherwise) =>
+    Number.isFinite(value) && value >= low && value <= high ? value : otherwise;
   const posture = postureFrom(link.get('posture') ?? '');
   if (posture) state.settle(posture.q, posture.tilt, 0);
   const reference = postureFrom(link.get('reference') ?? '');
@@ -48,16 +65,25 @@ function takeLink(text, state) {
   if (end > begin) state.ownRanges[state.kind] = { begin, end };
   const camera = numbers('camera');
   if (camera.length >= 5 && camera.every(Number.isFinite)) {
-    state.camera = { azimuth: camera[0], elevation: within(camera[1], -1.58, 1.58, 0), zoom: within(camera[2], 0.3, 30, 1), pan: camera.slice(3, 5), pivot: camera.length === 8 ? camera.slice(5) : null };
+    state.camera = {
+      azimuth: camera[0],
+      elevation: within(camera[1], -1.58, 1.58, 0),
+      zoom: within(camera[2], 0.3, 30, 1),
+      pan: camera.slice(3, 5),
+      pivot: camera.length === 8 ? camera.slice(5) : null,
+    };
   }
   const slices = numbers('slices');
-  if (slices.length === 3 && slices.every((x, axis) => x > state.body.low[axis] && x < state.body.high[axis])) state.slices = slices;
+  if (slices.length === 3 && slices.every((x, axis) => x > state.body.low[axis] && x < state.body.high[axis]))
+    state.slices = slices;
   state.inside = Boolean(state.basis.inside) && link.get('inside') !== '0';
   const target = numbers('target')[0];
   state.picked = Number.isInteger(target) && within(target, 0, (state.basis.inside?.names.length ?? 1) - 1, -1) >= 0;
   if (state.picked) state.chosen = target;
   state.from = state.basis.froms[numbers('since')[0] ?? 0] ?? state.basis.froms[0];
-  state.probes = numbers('probes', '.').filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices).slice(0, 8);
+  state.probes = numbers('probes', '.')
+    .filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices)
+    .slice(0, 8);
 }
 
 /** Return the picture with the notes, title, `lines` of text and, unless `range` is null, the colour bar as a PNG blob.
@@ -85,8 +111,20 @@ function savePicture(canvas, draw, title, lines, range, colours) {
     context.fillRect(left + i, top, 1.5, 12);
   }
   if (range) text(range.title, left, top - 8, '600 13px');
-  for (let i = Math.ceil((range?.begin ?? 0) / (range?.step ?? 1) - 1e-9); range && i * range.step <= range.end * (1 + 1e-9); ++i) {
-    text(plain(i * range.step), left + (width * (i * range.step - range.begin)) / (range.end - range.begin), top + 28, '12px', 'center');
+  for (
+    let i = Math.ceil((range?.begin ?? 0) / (range?.step ?? 1) - 1e-9);
+    range && i * range.step <= range.end * (1 + 1e-9);
+    ++i
+  ) {
+    text(
+      plain(i * range.step),
+      left + (width * (i * range.step - range.begin)) / (range.end - range.begin),
+      top + 28,
+      '12px',
+      'center',
+    );
   }
-  return new Promise((done) => { paper.toBlob(done, 'image/png'); });
+  return new Promise((done) => {
+    paper.toBlob(done, 'image/png');
+  });
 }

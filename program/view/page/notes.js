@@ -10,7 +10,10 @@ function project(pane, [x, y, z], ratio) {
   if (eye[2] >= 0) return null;
   const [left, bottom, width, height] = pane.box;
   const ndc = [0, 1].map((i) => (pane.projection[5 * i] * eye[i]) / -eye[2]);
-  return [(left + ((ndc[0] + 1) / 2) * width) / ratio, (pane.canvasHeight - bottom - ((ndc[1] + 1) / 2) * height) / ratio];
+  return [
+    (left + ((ndc[0] + 1) / 2) * width) / ratio,
+    (pane.canvasHeight - bottom - ((ndc[1] + 1) / 2) * height) / ratio,
+  ];
 }
 
 /** Return a name as the picture shows it: cut at a character if it has more than `longest`. */
@@ -33,15 +36,18 @@ function drawArrow(context, [x, y], [u, v], head) {
   context.fill();
 }
 
-/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a halo as wide as the expected error,
- * and an arrow. Positions and sizes are pixels. */
+/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a halo as wide as the expected
+ * error, and an arrow. Positions and sizes are pixels. */
 function drawTrace(context, was, at, radius, halo) {
   const circle = ([x, y], r) => {
     context.beginPath();
     context.arc(x, y, r, 0, 2 * Math.PI);
   };
   context.fillStyle = css('--change');
-  for (const [alpha, r] of [[0.25, radius + halo], [0.85, radius]]) {
+  for (const [alpha, r] of [
+    [0.25, radius + halo],
+    [0.85, radius],
+  ]) {
     context.globalAlpha = alpha;
     circle(at, r);
     context.fill();
@@ -57,10 +63,12 @@ function drawTrace(context, was, at, radius, halo) {
   context.stroke();
   context.setLineDash([]);
   context.lineWidth = radius > 20 ? 2.5 : 1.5;
-  if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 4) drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
+  if (Math.hypot(at[0] - was[0], at[1] - was[1]) > 4)
+    drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
 }
 
-/** The canvas with the notes. `taken` has the boxes [left, top, right, bottom], CSS pixels, that names may not cover. */
+/** The canvas with the notes. `taken` has the boxes [left, top, right, bottom], CSS pixels, that names may not cover.
+ * */
 class Notes {
   constructor(canvas) {
     this.canvas = canvas;
@@ -68,7 +76,14 @@ class Notes {
 
   text(words, x, y, { align = 'left', colour = '--ink', font = '13px' } = {}) {
     const { context } = this;
-    Object.assign(context, { textAlign: align, textBaseline: 'middle', font: `${font} system-ui, sans-serif`, lineJoin: 'round', strokeStyle: css('--paper-solid'), fillStyle: colour.startsWith('--') ? css(colour) : colour });
+    Object.assign(context, {
+      textAlign: align,
+      textBaseline: 'middle',
+      font: `${font} system-ui, sans-serif`,
+      lineJoin: 'round',
+      strokeStyle: css('--paper-solid'),
+      fillStyle: colour.startsWith('--') ? css(colour) : colour,
+    });
     context.lineWidth = 3;
     context.strokeText(words, x, y);
     context.fillText(words, x, y);
@@ -89,7 +104,10 @@ class Notes {
       const words = `gravity, ${rotate(pane.turn, pane.gravity)[2] > 0 ? 'towards you' : 'away from you'}`;
       context.font = '12px system-ui, sans-serif';
       const half = context.measureText(words).width / 2 + 10; // with a margin to the edge of the picture
-      this.text(words, Math.max(half, Math.min(this.canvas.clientWidth - half, x)), y - 16, { align: 'center', font: '12px' });
+      this.text(words, Math.max(half, Math.min(this.canvas.clientWidth - half, x)), y - 16, {
+        align: 'center',
+        font: '12px',
+      });
     }
   }
 
@@ -97,16 +115,25 @@ class Notes {
    * down, up or to the other side. */
   name(at, lines, { width, height }, colour) {
     const { context, taken } = this;
-    const wide = Math.max(...lines.map((line, i) => {
-      context.font = `${i ? '12px' : '600 13px'} system-ui, sans-serif`;
-      return context.measureText(line).width;
-    }));
+    const wide = Math.max(
+      ...lines.map((line, i) => {
+        context.font = `${i ? '12px' : '600 13px'} system-ui, sans-serif`;
+        return context.measureText(line).width;
+      }),
+    );
     let side = at[0] + 70 + wide < width ? 1 : -1;
     const place = [at[0] + side * 60, at[1] + 4];
-    const box = () => [place[0] - (side < 0 ? wide : 0), place[1] - 9, place[0] + (side > 0 ? wide : 0), place[1] + 16 * lines.length - 7];
-    const covers = ([left, top, right, bottom]) => left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1];
+    const box = () => [
+      place[0] - (side < 0 ? wide : 0),
+      place[1] - 9,
+      place[0] + (side > 0 ? wide : 0),
+      place[1] + 16 * lines.length - 7,
+    ];
+    const covers = ([left, top, right, bottom]) =>
+      left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1];
     const fits = () => !taken.some(covers) && box()[0] > 0 && box()[1] > 0 && box()[3] < height;
-    for (let steps = 1; steps < 200 && !fits(); ++steps) { // near the target on either side first, then farther
+    for (let steps = 1; steps < 200 && !fits(); ++steps) {
+      // near the target on either side first, then farther
       if (steps % 2 === 0) side = -side;
       place[0] = at[0] + side * 60;
       place[1] = at[1] + 4 + 8 * Math.ceil(steps / 4) * (steps % 4 < 2 ? 1 : -1);
@@ -118,7 +145,13 @@ class Notes {
     context.moveTo(at[0] + side * 6, at[1]);
     context.lineTo(place[0] - side * 5, place[1]);
     context.stroke();
-    lines.forEach((line, i) => this.text(line, place[0], place[1] + 16 * i, { align: side > 0 ? 'left' : 'right', colour: i ? '--ink' : colour, font: i ? '12px' : '600 13px' }));
+    lines.forEach((line, i) =>
+      this.text(line, place[0], place[1] + 16 * i, {
+        align: side > 0 ? 'left' : 'right',
+        colour: i ? '--ink' : colour,
+        font: i ? '12px' : '600 13px',
+      }),
+    );
   }
 
   /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside it or, if the
@@ -127,7 +160,7 @@ class Notes {
     const { context, taken } = this;
     const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
     if (!was || !at) return;
-    const scale = (1 / pane.pixel); // CSS pixels for each mm
+    const scale = 1 / pane.pixel; // CSS pixels for each mm
     const narrow = width < 720;
     const size = Math.min(92, height * 0.2, width * 0.15);
     const middle = [width - size - (narrow ? 10 : 172), size + 12];
@@ -136,7 +169,8 @@ class Notes {
     drawTrace(context, was, at, Math.max(4, radius * scale), 0);
     context.fillStyle = context.strokeStyle = css('--line');
     context.lineWidth = 1;
-    for (const side of [-1, 1]) { // lines from the trace to the circle
+    for (const side of [-1, 1]) {
+      // lines from the trace to the circle
       const [dx, dy] = [middle[0] - at[0], middle[1] - at[1]];
       const far = Math.hypot(dx, dy);
       context.beginPath();
@@ -158,12 +192,24 @@ class Notes {
     context.restore();
     taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 22 : 6)]);
     if (narrow) {
-      this.text(shortName(target.name), width - 10, middle[1] + size + 12, { align: 'right', colour: '--change', font: '600 12px' });
+      this.text(shortName(target.name), width - 10, middle[1] + size + 12, {
+        align: 'right',
+        colour: '--change',
+        font: '600 12px',
+      });
       return;
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
-    const lines = [[shortName(target.name, 17), '--change', '650 14px'], [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'], ...ways.map((way) => [way, '--ink', '12px']), [`dashed: ${from}`, '--soft', '12px'], [`halo: ${errorText(error)} wide (error)`, '--soft', '12px']].slice(0, target.error === null ? -1 : undefined);
-    lines.forEach(([words, colour, font], i) => this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }));
+    const lines = [
+      [shortName(target.name, 17), '--change', '650 14px'],
+      [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'],
+      ...ways.map((way) => [way, '--ink', '12px']),
+      [`dashed: ${from}`, '--soft', '12px'],
+      [`halo: ${errorText(error)} wide (error)`, '--soft', '12px'],
+    ].slice(0, target.error === null ? -1 : undefined);
+    lines.forEach(([words, colour, font], i) =>
+      this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }),
+    );
   }
 }
 

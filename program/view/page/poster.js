@@ -24,19 +24,40 @@ class Poster {
     for (const pane of panes) this.paint(pane);
   }
 
-  paint({ state, origin, toEye: m, projection, box: [left, bottom, width, height], canvasHeight, range, map, opacity, measure, plain }) {
-    const { context, basis: { corners, cornerBegin, vertices, colours } } = this;
+  paint({
+    state,
+    origin,
+    toEye: m,
+    projection,
+    box: [left, bottom, width, height],
+    canvasHeight,
+    range,
+    map,
+    opacity,
+    measure,
+    plain,
+  }) {
+    const {
+      context,
+      basis: { corners, cornerBegin, vertices, colours },
+    } = this;
     const [now, from] = [this.places[state], this.places[origin]];
     const screen = new Float32Array(3 * vertices);
     for (let v = 0; v < vertices; ++v) {
-      const [x, y, z] = [0, 1, 2].map((i) => m[i] * now[3 * v] + m[4 + i] * now[3 * v + 1] + m[8 + i] * now[3 * v + 2] + m[12 + i]);
+      const [x, y, z] = [0, 1, 2].map(
+        (i) => m[i] * now[3 * v] + m[4 + i] * now[3 * v + 1] + m[8 + i] * now[3 * v + 2] + m[12 + i],
+      );
       screen[3 * v] = left + ((1 - (projection[0] * x) / z) / 2) * width;
       screen[3 * v + 1] = canvasHeight - bottom - ((1 - (projection[5] * y) / z) / 2) * height;
       screen[3 * v + 2] = z;
     }
     const across = (places, t, i) => places[3 * corners[t + 1] + i] - places[3 * corners[t] + i];
     const down = (places, t, i) => places[3 * corners[t + 2] + i] - places[3 * corners[t] + i];
-    const normal = (places, t) => cross([0, 1, 2].map((i) => across(places, t, i)), [0, 1, 2].map((i) => down(places, t, i)));
+    const normal = (places, t) =>
+      cross(
+        [0, 1, 2].map((i) => across(places, t, i)),
+        [0, 1, 2].map((i) => down(places, t, i)),
+      );
     const value = (t) => {
       if (measure === 1) return 100 * (Math.hypot(...normal(now, t)) / Math.hypot(...normal(from, t)) - 1);
       const at = 3 * corners[t];
@@ -50,17 +71,27 @@ class Poster {
     };
     const seen = [];
     opacity.forEach((amount, lung) => {
-      if (amount > 0) for (let t = cornerBegin[lung]; t < cornerBegin[lung + 1]; t += 3) if (plain || across(screen, t, 0) * down(screen, t, 1) < across(screen, t, 1) * down(screen, t, 0)) seen.push(t);
+      if (amount > 0)
+        for (let t = cornerBegin[lung]; t < cornerBegin[lung + 1]; t += 3)
+          if (plain || across(screen, t, 0) * down(screen, t, 1) < across(screen, t, 1) * down(screen, t, 0))
+            seen.push(t);
     });
     seen.sort((a, b) => screen[3 * corners[a] + 2] - screen[3 * corners[b] + 2]);
     for (const t of seen) {
       const f = plain ? edge(t) : 0;
       const at = 4 * Math.round(255 * Math.max(0, Math.min(1, (value(t) - range.begin) / (range.end - range.begin))));
       context.fillStyle = context.strokeStyle = plain // the shell of surface.frag.glsl
-        ? `rgb(${[[235, 255], [168, 242], [158, 237]].map(([pink, white]) => Math.round(pink + f * (white - pink))).join(' ')} / ${(0.1 + 0.75 * f ** 2.2).toFixed(3)})`
+        ? `rgb(${[
+            [235, 255],
+            [168, 242],
+            [158, 237],
+          ]
+            .map(([pink, white]) => Math.round(pink + f * (white - pink)))
+            .join(' ')} / ${(0.1 + 0.75 * f ** 2.2).toFixed(3)})`
         : `rgb(${colours[map].subarray(at, at + 3).join(' ')})`;
       context.beginPath();
-      for (let i = 0; i < 3; ++i) context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
+      for (let i = 0; i < 3; ++i)
+        context[i ? 'lineTo' : 'moveTo'](screen[3 * corners[t + i]], screen[3 * corners[t + i] + 1]);
       context.closePath();
       context.fill();
       if (!plain) context.stroke(); // closes the gaps between neighbouring triangles

@@ -16,12 +16,13 @@ const turn = (axis, angle) => {
 };
 
 /** Return the quaternion of the rotation by b, followed by a. */
-const compose = (a, b) => unit([
-  a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
-  a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-  a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
-  a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-]);
+const compose = (a, b) =>
+  unit([
+    a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1],
+    a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+    a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3],
+    a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+  ]);
 
 const inverse = (q) => [-q[0], -q[1], -q[2], q[3]];
 
@@ -36,17 +37,39 @@ function slerp(a, b, t) {
   const sign = cosine < 0 ? -1 : 1;
   cosine = Math.min(1, Math.abs(cosine));
   const angle = Math.acos(cosine);
-  const [p, q] = angle < 1e-4 ? [1 - t, t] : [Math.sin((1 - t) * angle) / Math.sin(angle), Math.sin(t * angle) / Math.sin(angle)];
+  const [p, q] =
+    angle < 1e-4 ? [1 - t, t] : [Math.sin((1 - t) * angle) / Math.sin(angle), Math.sin(t * angle) / Math.sin(angle)];
   return unit(a.map((x, i) => p * x + sign * q * b[i]));
 }
 
 /** Return the matrix that rotates by the quaternion q, then adds `offset`. */
 function rigid(q, offset) {
-  const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(q, axis));
+  const columns = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ].map((axis) => rotate(q, axis));
   return new Float32Array([...columns[0], 0, ...columns[1], 0, ...columns[2], 0, ...offset, 1]);
 }
 
 function perspective(fieldOfView, aspect, near, far) {
   const f = 1 / Math.tan(fieldOfView / 2);
-  return new Float32Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
+  return new Float32Array([
+    f / aspect,
+    0,
+    0,
+    0,
+    0,
+    f,
+    0,
+    0,
+    0,
+    0,
+    (far + near) / (near - far),
+    -1,
+    0,
+    0,
+    (2 * far * near) / (near - far),
+    0,
+  ]);
 }

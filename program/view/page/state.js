@@ -29,8 +29,8 @@ const near = (a, b) => dot(a, b) > Math.cos(0.004);
 const same = (a, b) => Math.hypot(...cross(a, b)) < 0.0005 && dot(a, b) > 0; // other directions are written as numbers
 const NAMED = [...POSTURES.slice(0, 5), INVERTED].map((p) => ({ name: p.name, gravity: gravityOf(p.q) }));
 
-/** Return a direction of gravity as text, in the notation of --posture: a name, a name with a tilt or supine with a roll
- * in degrees, or three numbers. */
+/** Return a direction of gravity as text, in the notation of --posture: a name, a name with a tilt or supine with a
+ * roll in degrees, or three numbers. */
 function postureText(gravity) {
   const named = NAMED.find((p) => near(p.gravity, gravity));
   if (named) return named.name;
@@ -55,7 +55,8 @@ function postureFrom(text) {
     const now = rotate(LYING, unit(numbers)); // gravity, rotated to the room's axes for a supine patient
     const axis = cross(now, [0, 0, -1]);
     const size = Math.hypot(...axis);
-    const swing = size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
+    const swing =
+      size < 1e-9 ? (now[2] < 0 ? IDENTITY : turn([1, 0, 0], Math.PI)) : turn(unit(axis), Math.atan2(size, -now[2]));
     return { q: compose(swing, LYING), tilt: 0 };
   }
   const [, name, roll = '0', tilt = '0'] = /^([a-z]+)(?:[@>]([+-]?[\d.]+))?([+-][\d.]+)?$/i.exec(word) ?? [];
@@ -70,13 +71,20 @@ const FADED = 0.35; // opacity of translucent lungs
 const FIRST_CAMERA = { azimuth: 0, elevation: 0.05, zoom: 1, pan: [0, 0], pivot: null };
 
 /** Names of the views. The key is the direction of the body that faces the viewer, such as A for anterior. */
-const VIEWS = { A: 'From the front', P: 'From the back', L: 'From the left', R: 'From the right', H: 'From the head', F: 'From the feet' };
+const VIEWS = {
+  A: 'From the front',
+  P: 'From the back',
+  L: 'From the left',
+  R: 'From the right',
+  H: 'From the head',
+  F: 'From the feet',
+};
 
 class State {
   constructor(basis) {
     this.basis = basis;
     this.standing = { q: POSTURES[2].q, tilt: 0 }; // chosen posture; tilt in degrees
-    this.q = POSTURES[2].q;                        // rotation shown now; while `turning`, on the way to the chosen posture
+    this.q = POSTURES[2].q; // rotation shown now; while `turning`, on the way to the chosen posture
     this.turning = null;
     this.takeVolumes();
     this.rate = 12;
@@ -88,32 +96,36 @@ class State {
     this.ghost = !basis.inside;
     this.arrows = false;
     this.wires = false;
-    this.beside = false;                           // whether the other posture is shown beside the chosen one
-    this.inside = Boolean(basis.inside);           // whether structures inside the lungs are shown
-    this.chosen = 0;                               // structure inside the lungs that the sentence is about
-    this.picked = false;                           // whether the user chose it; otherwise it is the one that firstTarget returns
+    this.beside = false; // whether the other posture is shown beside the chosen one
+    this.inside = Boolean(basis.inside); // whether structures inside the lungs are shown
+    this.chosen = 0; // structure inside the lungs that the sentence is about
+    this.picked = false; // whether the user chose it; otherwise it is the one that firstTarget returns
     this.opacity = Array(basis.lungs).fill(FADED);
-    this.cut = { axis: -1, at: 0.5 };              // cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
-    this.ownRanges = {};                           // for each of KINDS, the range {begin, end} of the colour bar if the user typed one
-    this.probes = [];                              // marked vertices
+    // Cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
+    this.cut = { axis: -1, at: 0.5 };
+    this.ownRanges = {}; // for each of KINDS, the range {begin, end} of the colour bar if the user typed one
+    this.probes = []; // marked vertices
     this.room = true;
     this.roomBlend = 1; // 0: the view is fixed to the patient; 1: to the room; in between during the change
     this.camera = { ...FIRST_CAMERA };
     this.moment = null;
-    [this.from] = basis.froms;                     // state of the lungs from which displacements are measured
-    this.live = false;                             // whether a tracker moves the patient
+    [this.from] = basis.froms; // state of the lungs from which displacements are measured
+    this.live = false; // whether a tracker moves the patient
     this.measure();
-    this.slices = null;                            // x, y, z of the sagittal, coronal and axial plane, mm; null for those through the chosen structure
+    // X, y, z of the sagittal, coronal and axial plane, mm; null for those through the chosen structure
+    this.slices = null;
   }
 
-  /** Set the tidal volume, and the range of volumes above rest, or above the scan if rest is unknown, mL. Those of another
-   * simulator's fields are the volumes that were simulated in some of POSTURES. A breath stays in the range of all. */
+  /** Set the tidal volume, and the range of volumes above rest, or above the scan if rest is unknown, mL. Those of
+   * another simulator's fields are the volumes that were simulated in some of POSTURES. A breath stays in the range of
+   * all. */
   takeVolumes() {
     const { basis } = this;
     this.tidal = basis.breathVolume;
     this.depthMin = 0;
-    const held = basis.breathes ? momentFor(basis, gravityOf(POSTURES[0].q), 0).held ?? basis.references : [];
-    this.depthMax = Math.max(2 * this.tidal, sumOf(basis.references) - sumOf(held)); // full inflation, if it was scanned
+    const held = basis.breathes ? (momentFor(basis, gravityOf(POSTURES[0].q), 0).held ?? basis.references) : [];
+    // Full inflation, if it was scanned
+    this.depthMax = Math.max(2 * this.tidal, sumOf(basis.references) - sumOf(held));
     this.tidalMax = this.depthMax;
     this.shared = [0, Infinity]; // volumes that are within reach in each of POSTURES
     if (basis.order > 0) {
@@ -214,33 +226,47 @@ class State {
   }
 
   measure() {
-    const deepest = this.playing || this.depth > this.expired ? Math.max(this.expired + this.tidal, this.depth) : this.expired;
+    const deepest =
+      this.playing || this.depth > this.expired ? Math.max(this.expired + this.tidal, this.depth) : this.expired;
     if (deepest === this.measured && this.from === this.measuredFrom) return;
     [this.measured, this.measuredFrom] = [deepest, this.from];
     const before = samplePlaces(this.basis, this.from);
-    const areas = (places) => Float64Array.from({ length: places.length / 3 }, (_, i) => {
-      const [a, b, c] = places.slice(3 * i, 3 * i + 3);
-      return Math.hypot(...cross(b.map((x, j) => x - a[j]), c.map((x, j) => x - a[j])));
-    });
+    const areas = (places) =>
+      Float64Array.from({ length: places.length / 3 }, (_, i) => {
+        const [a, b, c] = places.slice(3 * i, 3 * i + 3);
+        return Math.hypot(
+          ...cross(
+            b.map((x, j) => x - a[j]),
+            c.map((x, j) => x - a[j]),
+          ),
+        );
+      });
     const far = (a, b) => a.map((p, i) => Math.hypot(p[0] - b[i][0], p[1] - b[i][1], p[2] - b[i][2]));
     const most = { plain: 1, displacement: 0, difference: 0, expansion: 0 };
-    const take = (kind, values) => { for (const value of values) most[kind] = Math.max(most[kind], value); };
+    const take = (kind, values) => {
+      for (const value of values) most[kind] = Math.max(most[kind], value);
+    };
     const areasBefore = areas(before);
     const all = [before];
     const states = POSTURES.map((p) => momentFor(this.basis, gravityOf(tilted(p.q, p.tilt)), deepest))
-      .filter((m) => !m.folds).map((m) => samplePlaces(this.basis, m));
+      .filter((m) => !m.folds)
+      .map((m) => samplePlaces(this.basis, m));
     states.forEach((places, i) => {
       take('displacement', far(places, before));
       all.push(places);
-      const growth = areas(places).map((area, j) => Math.abs(100 * (area / areasBefore[j] - 1))).sort();
+      const growth = areas(places)
+        .map((area, j) => Math.abs(100 * (area / areasBefore[j] - 1)))
+        .sort();
       take('expansion', growth.slice(0, Math.ceil(0.95 * growth.length))); // without the narrowest triangles
       for (const other of states.slice(i + 1)) take('difference', far(places, other));
     });
-    this.ranges = Object.fromEntries(Object.keys(most).map((kind) => {
-      const end = rangeEnd(most[kind] > 1e-3 ? most[kind] : 0);
-      const begin = kind === 'expansion' ? -end : 0; // -end: shrinkage of the area has the same range as growth
-      return [kind, { begin, end, step: tickStep(end - begin), beyond: kind === 'expansion', most: most[kind] }];
-    }));
+    this.ranges = Object.fromEntries(
+      Object.keys(most).map((kind) => {
+        const end = rangeEnd(most[kind] > 1e-3 ? most[kind] : 0);
+        const begin = kind === 'expansion' ? -end : 0; // -end: shrinkage of the area has the same range as growth
+        return [kind, { begin, end, step: tickStep(end - begin), beyond: kind === 'expansion', most: most[kind] }];
+      }),
+    );
     this.body = boundsOf(all.flat());
   }
 }

@@ -5,19 +5,26 @@
 const XR_AWAY = 0.7; // distance of the lungs from the viewer's first position in virtual reality, m
 
 /** Return the product of column-major 4 x 4 matrices. */
-const product = (a, b) => Float32Array.from({ length: 16 }, (_, i) => {
-  let sum = 0;
-  for (let k = 0; k < 4; ++k) sum += a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k];
-  return sum;
-});
+const product = (a, b) =>
+  Float32Array.from({ length: 16 }, (_, i) => {
+    let sum = 0;
+    for (let k = 0; k < 4; ++k) sum += a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k];
+    return sum;
+  });
 
 /** Return a copy of a pane (a view to draw) for one eye of the headset. `room` maps millimetres in the patient's axes,
  * turned by pane.turn if `turned` is true, to metres in the room. */
 function xrPane(pane, view, { x, y, width, height }, room, turned) {
   const toEye = product(view.transform.inverse.matrix, room);
   return {
-    ...pane, box: [x, y, width, height], toEye: turned ? product(toEye, pane.toEye) : toEye, tableToEye: turned && pane.tableToEye && product(toEye, pane.tableToEye),
-    fade: turned ? pane.fade : null, projection: view.projectionMatrix, pixel: 0, dark: true,
+    ...pane,
+    box: [x, y, width, height],
+    toEye: turned ? product(toEye, pane.toEye) : toEye,
+    tableToEye: turned && pane.tableToEye && product(toEye, pane.tableToEye),
+    fade: turned ? pane.fade : null,
+    projection: view.projectionMatrix,
+    pixel: 0,
+    dark: true,
   };
 }
 
@@ -37,7 +44,13 @@ class Tracker {
       const [known, seen] = [this.known, rotate(inverse(untrimmed), [0, -1, 0])];
       const axis = cross(known, seen);
       const size = Math.hypot(...axis);
-      this.off = size < 1e-6 ? IDENTITY : turn(axis.map((x) => x / size), Math.atan2(size, dot(known, seen)));
+      this.off =
+        size < 1e-6
+          ? IDENTITY
+          : turn(
+              axis.map((x) => x / size),
+              Math.atan2(size, dot(known, seen)),
+            );
     }
     this.q = compose(untrimmed, this.off);
     this.place = [position.x, position.y, position.z];
@@ -50,9 +63,38 @@ class Tracker {
   room(breastbone) {
     const metres = rigid(this.q, [0, 0, 0]).map((x, i) => (i < 15 ? 1e-3 * x : x));
     const away = rotate(this.q, breastbone);
-    this.place.forEach((x, i) => { metres[12 + i] = x - 1e-3 * away[i]; });
+    this.place.forEach((x, i) => {
+      metres[12 + i] = x - 1e-3 * away[i];
+    });
     return metres;
   }
+}
+
+/** Return a function that draws a frame of a session for each eye, and returns whether it has used `pressed`. */
+function xrFrames({ tracker, space, layer, torso, getPicture, frame, sentence }) {
+  const breastbone = [torso.centre[0], torso.centre[1] - 1.2 * torso.half[1], torso.centre[2] + 0.3 * torso.half[2]];
+  const away = (distance) =>
+    Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * distance - XR_AWAY, 1]);
+  const overHead = (room) => (i) =>
+    room[12 + i] + torso.centre.reduce((sum, x, k) => sum + room[4 * k + i] * x, i === 1 ? 0.35 : 0);
+  return (time, seen, session, pressed) => {
+    const controller =
+      tracker && [...session.inputSources].find(({ targetRayMode }) => targetRayMode === 'tracked-pointer');
+    const held = controller && seen.getPose(controller.targetRaySpace, space);
+    if (held) tracker.take(held, pressed);
+    const views = seen.getViewerPose(space)?.views ?? [];
+    const pane = views.length && (!tracker || tracker.place) ? frame(time) : null;
+    if (!pane) return Boolean(held);
+    const room = tracker ? tracker.room(breastbone) : away(pane.distance);
+    const above = tracker ? [0, 1, 2].map(overHead(room)) : [0, 0.35, -XR_AWAY];
+    const note = (view) => ({ text: sentence(), toEye: view.transform.inverse.matrix, at: above });
+    const eyes = views.map((view) => ({
+      ...xrPane(pane, view, layer.getViewport(view), room, !tracker),
+      note: note(view),
+    }));
+    getPicture().draw(eyes, layer.framebuffer);
+    return Boolean(held);
+  };
 }
 
 /** If the browser supports a headset, show `button`, which starts and ends a session of `kind`: immersive-vr or
@@ -69,11 +111,15 @@ async function offerXr(kind, button, state, { getPicture, frame, sentence, over 
       session.end();
       return;
     }
-    const { gl, basis: { torso } } = getPicture();
+    const {
+      gl,
+      basis: { torso },
+    } = getPicture();
     try {
       session = await navigator.xr.requestSession(kind);
       await gl.makeXRCompatible();
-    } catch { // the user declined, or the graphics card cannot serve the headset
+    } catch {
+      // the user declined, or the graphics card cannot serve the headset
       session?.end();
       session = null;
       return;
@@ -83,29 +129,20 @@ async function offerXr(kind, button, state, { getPicture, frame, sentence, over 
     const space = await session.requestReferenceSpace('local');
     const tracker = kind === 'immersive-ar' ? new Tracker(state) : null;
     let pressed = false;
-    session.addEventListener('select', () => { pressed = true; });
+    session.addEventListener('select', () => {
+      pressed = true;
+    });
     button.textContent = enter.replace('Enter', 'Leave');
     session.addEventListener('end', () => {
       session = null;
       button.textContent = enter;
       over();
     });
-    const breastbone = [torso.centre[0], torso.centre[1] - 1.2 * torso.half[1], torso.centre[2] + 0.3 * torso.half[2]];
+    const show = xrFrames({ tracker, space, layer, torso, getPicture, frame, sentence });
     const draw = (time, seen) => {
       if (!session) return; // the session ended after this frame was requested
       session.requestAnimationFrame(draw);
-      const controller = tracker && [...session.inputSources].find(({ targetRayMode }) => targetRayMode === 'tracked-pointer');
-      const held = controller && seen.getPose(controller.targetRaySpace, space);
-      if (held) {
-        tracker.take(held, pressed);
-        pressed = false;
-      }
-      const views = seen.getViewerPose(space)?.views ?? [];
-      const pane = views.length && (!tracker || tracker.place) ? frame(time) : null;
-      if (!pane) return;
-      const room = tracker ? tracker.room(breastbone) : Float32Array.from([1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3 * pane.distance - XR_AWAY, 1]);
-      const above = tracker ? [0, 1, 2].map((i) => room[12 + i] + torso.centre.reduce((sum, x, k) => sum + room[4 * k + i] * x, i === 1 ? 0.35 : 0)) : [0, 0.35, -XR_AWAY];
-      getPicture().draw(views.map((view) => ({ ...xrPane(pane, view, layer.getViewport(view), room, !tracker), note: { text: sentence(), toEye: view.transform.inverse.matrix, at: above } })), layer.framebuffer);
+      if (show(time, seen, session, pressed)) pressed = false;
     };
     session.requestAnimationFrame(draw);
   });

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// Draw the notes that belong to the state of the page: gravity, targets, probes, and names of two postures.
+
+/** Draw the notes over the picture. */
+function drawNotes() {
+  const { width, height } = sizeOf(notes.canvas);
+  const pane = panes.at(-1);
+  notes.context = freshContext(notes.canvas);
+  notes.taken = [];
+  const small = width < 520;
+  const [x, y] = [small ? 34 : width - 44, height - (small ? 100 : 92)];
+  notes.gravity(pane, x, y);
+  notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
+  if (inside && state.inside && state.moment && !state.turning) {
+    const between = targetsBetween(inside, state.moment, originMoment());
+    const few = inside.names.length <= 6;
+    for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
+      if (!few && part !== state.chosen) break;
+      if (!inside.members[part].length) continue;
+      const target = between[part];
+      const large = anatomyColour(inside, part);
+      if (part === state.chosen && target.mm > 0.05 && !large)
+        notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
+      else {
+        const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio()));
+        if (!was || !at) continue;
+        notes.context.strokeStyle = notes.context.fillStyle = css('--ink');
+        notes.context.lineWidth = 1.5;
+        if (!large && Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
+        const moves = `${target.mm.toFixed(1)} mm${isTold(target) ? '' : `, ${withinWords(target.error)}`}`;
+        const says = target.mm < 0.05 ? 'the reference' : moves;
+        notes.name(at, [shortName(target.name), ...(small ? [] : [says])], { width, height }, large ?? '--ink');
+      }
+    }
+  }
+  state.probes.forEach((vertex, i) => {
+    const at = project(pane, placeOf(basis, state.moment, vertex), ratio());
+    if (at) notes.text(`\u25cf ${i + 1}`, ...at, { font: '700 13px' });
+  });
+  if (state.beside)
+    [state.pinnedQ, state.goal].forEach((q, i) =>
+      notes.text(postureWords(gravityOf(q)), width * (0.25 + 0.5 * i), height - 16, {
+        align: 'center',
+        font: '600 14px',
+      }),
+    );
+}
