@@ -115,7 +115,7 @@ TEST(test_deform_volume_reached) {
          "lungs.safetensors: prone: prone at full inflation + 3000 mL: 9000 mL are 150 % "
          "of full inflation (6000 mL), outside the 10 to 120 %",
          "compare lungs.safetensors --postures prone --volume full+3000 -o b.html");
-  EXPECT(0, "note: without a breath: left side at 8261 mL: 8261 mL are 138 % of",
+  EXPECT(0, "note: without a breath: left: left side at 8261 mL: 8261 mL are 138 % of",
          "compare lungs.safetensors --postures left --volume rest --breath 5000mL -o a.html");
   EXPECT(5, "8025 mL are 134 % of",
          "breathe lungs.safetensors --posture prone --tidal 4900mL --fps 2 -o b.vtp");
