@@ -73,7 +73,8 @@ with tempfile.TemporaryDirectory() as folder:
         for fact, (view, shown) in itertools.product(caveats, views.items()):
             assert fact["name"] in shown, (kind, fact["name"], view)
         for fact in caveats:
-            words = [word for word in re.findall("[a-z]+", f"{fact['name']} {fact['source']}") if len(set(word)) < len(word) > 4]
+            words = [word for word in re.findall("[a-z]+", f"{fact['name']} {fact['source']}")
+                     if len(set(word)) < len(word) > 4 and not re.search("f[fil]", word)]  # which are one glyph in some fonts
             for word in words:
                 assert drawn(word, glyphs), (kind, word, "render")
     assert counts["healthy"]["volume at rest, supine"] == "assumed" and counts["given"]["volume at rest, supine"] == "given"
