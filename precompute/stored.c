@@ -157,8 +157,10 @@ supine_status supine_precompute_measure_stored(const supine_prepared *prepared, 
                                                size_t size, supine_computed *computed,
                                                supine_arena *arena, supine_stored *stored,
                                                supine_error *error) {
-  const supine_basis_options options = {
-      .size = sizeof options, .simd = SUPINE_SIMD_PORTABLE, .without_normals = true};
+  const supine_basis_options options = {.size = sizeof options,
+                                        .simd = SUPINE_SIMD_PORTABLE,
+                                        .without_normals = true,
+                                        .allow_folds = true}; /* its limits are measured here */
   SUPINE_FREED_BY(basis_close) supine_basis *basis = NULL;
   SUPINE_TRY(supine_basis_open_memory_with(bytes, size, &options, &basis, error));
   supine_compression exact = stored->field;
