@@ -319,8 +319,6 @@ KNOWN = {
     ("command embed LABELS", "axes"): "belongs",
     ("command embed LABELS", "mirror"): "belongs",
     ("command deform --image", "shifted"): "belongs",
-    **{(door, kind): "fields" for door in ("command precompute --fields", "Python precompute(fields)")
-       for kind in ("axes", "mirror", "swapped")},
     ("command embed MESH", "range"): "one road",
     ("stream stream --volume", "range"): "one road",
     **{(door, "unit"): "one road" for door in ("command compare --breath", "command export --breath",
