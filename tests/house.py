@@ -5,8 +5,8 @@
 
 Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
 include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
-each other in cycles, that external names have the prefix of their folder, that functions have few lines and few
-parameters, that the licences name files that exist, that examples
+each other in cycles, that external names have the prefix of their folder, that functions (also those of JavaScript and Python) and
+lines of JavaScript are short and parameters few, that the licences name files that exist, that examples
 have a README and a test, that Python files define the names that they use, that nothing depends on the locale of the host program, that
 distances are printed without digits below rounding, and that tests do not wait for a time."""
 import builtins
@@ -16,6 +16,8 @@ import re
 import subprocess
 import symtable
 import sys
+
+import house_scripts
 
 source, build = sys.argv[1:3]
 faults = []
@@ -63,6 +65,17 @@ def tracked():
              for name in names if name.endswith((".c", ".h"))]
     files = [f for f in (listed or found) if f.split("/")[0] in ("base", "sh", "mesh", "precompute", "runtime", "program")]
     return [f for f in files if os.path.exists(os.path.join(source, f))]
+
+
+def scripts():
+    """Return the files of JavaScript and Python, without those of other packages."""
+    kinds = (".js", ".mjs", ".py")
+    listed = subprocess.run(["git", "-C", source, "ls-files", *("*" + kind for kind in kinds)], capture_output=True,
+                            text=True, check=False).stdout.split()
+    found = [os.path.relpath(os.path.join(folder, name), source) for folder, _, names in os.walk(source)
+             for name in names if name.endswith(kinds)] if not listed else []
+    return [f for f in listed + found if os.path.exists(os.path.join(source, f))
+            and not {"build", "node_modules"} & set(f.split("/"))]
 
 
 def included(file):
@@ -514,6 +527,7 @@ check_opening(files)
 check_python_names(tracked_python())
 check_include_cycles(files)
 check_names(folders, files)
+faults.extend(house_scripts.faults_of(source, scripts()))
 for fault in faults:
     print(fault)
 print(f"{len(folders)} folders, {len(files)} files, {len(faults)} faults")

@@ -189,6 +189,48 @@ def write_inputs(programs, vertices):
         make(which, "embed", "small.safetensors", "--grid", "4", "-o", "grid.safetensors")
 
 
+# Name, arguments and output of each command that is timed.
+ROWS = [
+    ("--help", ["--help"], None),
+    ("info", ["info", "large.safetensors"], None),
+    ("deform --image, 65 M voxels",
+     ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii", "-o",
+      "moved.nii"], "moved.nii"),
+    ("deform --image, .nii.gz",
+     ["deform", "grid.safetensors", "--posture", "prone", "--image", "packed.nii.gz", "-o",
+      "moved.nii.gz"], None),
+    ("deform --image --density",
+     ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii",
+      "--density", "-o", "moved.nii"], "moved.nii"),
+    ("deform --states, 1 image",
+     ["deform", "grid.safetensors", "--states", "states1.csv", "--image", "image.nii"],
+     None),
+    ("deform --states, 4 images",
+     ["deform", "grid.safetensors", "--states", "states4.csv", "--image", "image.nii"],
+     None),
+    ("deform --labels",
+     ["deform", "grid.safetensors", "--posture", "prone", "--labels", "labels.nii", "-o",
+      "moved.nii"], "moved.nii"),
+    ("embed, 20,000 points",
+     ["embed", "small.safetensors", "points.csv", "-o", "inside.safetensors"],
+     "inside.safetensors"),
+    ("breathe as VTP, 20 frames",
+     ["breathe", "large.safetensors", "--posture", "prone", "--seconds", "0.3", "-o",
+      "breath.vtp"], None),
+    ("validate", ["validate", "large.safetensors", "--state", "prone:rest:state.ply"],
+     None),
+    ("render, 20 panels",
+     ["render", "large.safetensors", "--posture", "supine,prone,left,right,upright",
+      "--view", "anterior,posterior,left,right", "-o", "panels.png"], "panels.png"),
+    ("precompute", ["precompute", "large.ply", "-o", "made.safetensors"], None),
+    ("precompute, 100,000 vertices", ["precompute", "middle.ply", "-o", "made.safetensors"],
+     None),
+    ("precompute, harmonics",
+     ["precompute", "large.ply", "--band", "3", "--modes", "harmonics", "-o",
+      "made.safetensors"], None),
+]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("old")
@@ -222,46 +264,7 @@ def main():
                             [[stream, program, f"{which}/large.safetensors", "3", "points"]
                              for which, program in enumerate(programs)], chosen.rounds,
                             lambda said: float(said.splitlines()[1].split()[5]))
-        rows = [
-            ("--help", ["--help"], None),
-            ("info", ["info", "large.safetensors"], None),
-            ("deform --image, 65 M voxels",
-             ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii", "-o",
-              "moved.nii"], "moved.nii"),
-            ("deform --image, .nii.gz",
-             ["deform", "grid.safetensors", "--posture", "prone", "--image", "packed.nii.gz", "-o",
-              "moved.nii.gz"], None),
-            ("deform --image --density",
-             ["deform", "grid.safetensors", "--posture", "prone", "--image", "image.nii",
-              "--density", "-o", "moved.nii"], "moved.nii"),
-            ("deform --states, 1 image",
-             ["deform", "grid.safetensors", "--states", "states1.csv", "--image", "image.nii"],
-             None),
-            ("deform --states, 4 images",
-             ["deform", "grid.safetensors", "--states", "states4.csv", "--image", "image.nii"],
-             None),
-            ("deform --labels",
-             ["deform", "grid.safetensors", "--posture", "prone", "--labels", "labels.nii", "-o",
-              "moved.nii"], "moved.nii"),
-            ("embed, 20,000 points",
-             ["embed", "small.safetensors", "points.csv", "-o", "inside.safetensors"],
-             "inside.safetensors"),
-            ("breathe as VTP, 20 frames",
-             ["breathe", "large.safetensors", "--posture", "prone", "--seconds", "0.3", "-o",
-              "breath.vtp"], None),
-            ("validate", ["validate", "large.safetensors", "--state", "prone:rest:state.ply"],
-             None),
-            ("render, 20 panels",
-             ["render", "large.safetensors", "--posture", "supine,prone,left,right,upright",
-              "--view", "anterior,posterior,left,right", "-o", "panels.png"], "panels.png"),
-            ("precompute", ["precompute", "large.ply", "-o", "made.safetensors"], None),
-            ("precompute, 100,000 vertices", ["precompute", "middle.ply", "-o", "made.safetensors"],
-             None),
-            ("precompute, harmonics",
-             ["precompute", "large.ply", "--band", "3", "--modes", "harmonics", "-o",
-              "made.safetensors"], None),
-        ]
-        for name, arguments, output in rows:
+        for name, arguments, output in ROWS:
             rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
             compare(name, programs, arguments, rounds, output)
 
