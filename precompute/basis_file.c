@@ -321,7 +321,7 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
        {clusters->count, k, SUPINE_CLUSTER_NUMBERS},
        clusters->vectors},
       {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? computed->fit.range : NULL},
-      {"simulated_limits", SUPINE_F64, 3, {g, 2, 9}, simulated ? s->limits : NULL},
+      {"simulated_limits", SUPINE_F64, 3, {g, 2, s->limit_terms}, simulated ? s->limits : NULL},
       {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},

@@ -82,6 +82,8 @@ static void report_fields(const supine_basis_report *made, const supine_fields_m
   report->order = made->fit.order;
   report->extrapolated = made->fit.extrapolated;
   report->cluster_count = made->cluster_count;
+  report->volume_error = made->fit.volume_error;
+  report->six_volumes = made->fit.six_volumes;
   report->displacement = motion->rms_mm;
   report->along_gravity = motion->along_mm;
   memcpy(report->nearest_supine, motion->nearest, sizeof report->nearest_supine);

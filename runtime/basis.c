@@ -441,7 +441,7 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   const size_t lungs = basis->info.lung_count;
   supine_simulated *s = &basis->simulated;
   size_t range[] = {lungs, 2};
-  size_t limits[] = {lungs, 2, RESTING_TERMS};
+  size_t limits[] = {lungs, 2, ANY};
   size_t shares[] = {lungs, RESTING_TERMS, ANY};
   if (basis->info.order == 0) {
     return SUPINE_OK;
@@ -450,6 +450,14 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
   REQUIRE(s->limits, c, "simulated_limits", SUPINE_F64, 3, limits);
   REQUIRE(s->shares, c, "simulated_shares", SUPINE_F64, 3, shares);
   s->share_count = shares[2];
+  s->limit_terms = limits[2];
+  size_t band = 0;
+  while (band < LIMIT_BAND_MAX && supine_sh_count(band) < s->limit_terms) {
+    ++band;
+  }
+  if (supine_sh_count(band) != s->limit_terms) {
+    return refuse(c, "tensor 'simulated_limits' has harmonics that are not complete");
+  }
   basis->info.is_fields = true;
   basis->info.has_full = s->full != NULL;
   SUPINE_TRY(read_numbers(c, "simulated_total_ml", 2, s->total));

@@ -14,6 +14,9 @@
 /** Number of harmonics that describe the volume at rest: bands 0 to 2. */
 enum { RESTING_TERMS = 9 };
 
+/* Highest degree of the harmonics of simulated limits. */
+enum { LIMIT_BAND_MAX = 11 };
+
 /** Sizes above which positions are written with stores that bypass the caches. One pose must exceed
  * both STREAM_BYTES and STREAM_RANGE. */
 enum {
@@ -29,9 +32,9 @@ enum { LUNG_NAME_SIZE = 32 }; /**< largest size of a lung's name in bytes, with 
  * volume. */
 typedef struct supine_simulated {
   const double *range; /**< [lungs, 2] volumes at t = -1 and t = 1 */
-  /** [lungs, 2, RESTING_TERMS] lowest and highest volume for a direction of gravity, as harmonics.
-   */
+  /** [lungs, 2, limit_terms] lowest and highest volume for a direction of gravity, as harmonics. */
   const double *limits;
+  size_t limit_terms;
   /** [lungs, RESTING_TERMS, share_count] volume of each lung, as products of harmonics and
    * Chebyshev polynomials of the total volume, mapped to -1 to 1. */
   const double *shares;
@@ -201,5 +204,11 @@ double supine_volume_square(size_t count, const double *form, const double *w);
  * together hold `volume` mL more than the reference surface.
  * @param pose  its weights are read, its gains written */
 supine_status supine_basis_add_volume(const supine_basis *basis, double volume, supine_pose *pose);
+
+/* Compute the normal of a triangle; its length is twice the area of the triangle. */
+void supine_triangle_normal(const float a[3], const float b[3], const float c[3], float n[3]);
+
+/* Give normals [count, 3] the length 1, or 0 to those without a direction. */
+void supine_normals_normalise(size_t count, float *normals);
 
 #endif

@@ -126,18 +126,61 @@ static void light(const supine_basis *basis, const supine_pose *pose, size_t beg
   supine_stream_fence(stream);
 }
 
+/* Write the position of a vertex: that in a range of positions, if it lies there. */
+static void find_position(const supine_basis *basis, const supine_pose *pose, size_t vertex,
+                          size_t begin, size_t end, const float *xyz, float position[3]) {
+  if (xyz != NULL && vertex >= begin && vertex < end) {
+    memcpy(position, xyz + 3 * (vertex - begin), 3 * sizeof *position);
+  } else {
+    (void)supine_deform_range(basis, pose, vertex, vertex + 1, position);
+  }
+}
+
+/* Compute the normals of vertices begin <= i < end from the triangles, as supine_normals does.
+ * @param xyz  [end - begin, 3] their positions, or NULL */
+static void light_triangles(const supine_basis *basis, const supine_pose *pose, size_t begin,
+                            size_t end, const float *xyz, float *normals) {
+  memset(normals, 0, 3 * (end - begin) * sizeof *normals);
+  for (size_t t = 0; t < basis->info.triangle_count; ++t) {
+    const uint32_t *corner = basis->info.triangles + 3 * t;
+    float p[3][3];
+    bool touches = false;
+    for (size_t j = 0; j < 3; ++j) {
+      touches = touches || (corner[j] >= begin && corner[j] < end);
+    }
+    if (!touches) {
+      continue;
+    }
+    for (size_t j = 0; j < 3; ++j) {
+      find_position(basis, pose, corner[j], begin, end, xyz, p[j]);
+    }
+    float normal[3];
+    supine_triangle_normal(p[0], p[1], p[2], normal);
+    for (size_t j = 0; j < 3; ++j) {
+      if (corner[j] >= begin && corner[j] < end) {
+        float *sum = normals + 3 * (corner[j] - begin);
+        for (size_t k = 0; k < 3; ++k) {
+          sum[k] += normal[k];
+        }
+      }
+    }
+  }
+  supine_normals_normalise(end - begin, normals);
+}
+
 supine_status supine_deform_lit_range(const supine_basis *basis, const supine_pose *pose,
                                       size_t begin, size_t end, float *xyz, float *normals) {
-  if (basis->info.normal_count == 0) {
-    return SUPINE_ERROR_UNSUPPORTED;
-  }
   if (!supine_basis_has_range(basis, pose, begin, end)) {
     return SUPINE_ERROR_ARGUMENT;
   }
   if (xyz != NULL) {
     (void)supine_deform_range(basis, pose, begin, end, xyz);
   }
-  light(basis, pose, begin, end, basis->stream && end - begin > STREAM_RANGE, normals);
+  if (basis->info.normal_count > 0) {
+    light(basis, pose, begin, end, basis->stream && end - begin > STREAM_RANGE, normals);
+  } else {
+    light_triangles(basis, pose, begin, end, xyz, normals);
+  }
   return SUPINE_OK;
 }
 

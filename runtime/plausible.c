@@ -194,7 +194,7 @@ static bool plausible_simulated(const supine_basis *basis, char *detail, size_t 
     const double *numbers;
     size_t count;
   } volumes[] = {{s->range, 2 * lungs},
-                 {s->limits, 2 * lungs * RESTING_TERMS},
+                 {s->limits, 2 * lungs * s->limit_terms},
                  {s->shares, lungs * RESTING_TERMS * s->share_count},
                  {s->full, lungs * RESTING_TERMS},
                  {s->total, 2},

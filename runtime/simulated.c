@@ -13,17 +13,33 @@
  * volume may be outside the limits by as much, as sums of volumes are rounded. */
 static const double close_enough = 1e-6;
 
+/* Part of the simulated range that the limits of a basis add to it at both ends
+ * (precompute/fields/limits.c). */
+static const double margin = 0.01;
+
 /* How far outside the simulated range of t the search may go: the volume of the surface differs
  * from the one that t stands for by less than that. */
 static const double beyond = 0.1;
 
+/* Number of intervals of t in which roots are sought where the ends of the range have none between
+ * them. */
+enum { SEARCH_STEPS = 64 };
+
 supine_status supine_simulated_limits(const supine_basis *basis, const double gravity[3],
                                       double (*limits)[2]) {
-  double y[RESTING_TERMS];
-  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  double y[(LIMIT_BAND_MAX + 1) * (LIMIT_BAND_MAX + 1)];
+  const size_t terms = basis->simulated.limit_terms;
+  size_t band = 0;
+  while (supine_sh_count(band) < terms) {
+    ++band;
+  }
+  SUPINE_TRY(supine_sh_evaluate(band, gravity, y));
   for (size_t row = 0; row < 2 * basis->info.lung_count; ++row) {
     double *limit = &limits[row / 2][row % 2];
-    *limit = supine_basis_sum_harmonics(basis->simulated.limits + row * RESTING_TERMS, y);
+    *limit = 0;
+    for (size_t t = 0; t < terms; ++t) {
+      *limit += basis->simulated.limits[row * terms + t] * y[t];
+    }
   }
   return SUPINE_OK;
 }
@@ -32,14 +48,16 @@ static double map_to_unit(double value, const double range[2]) {
   return 2 * (value - range[0]) / (range[1] - range[0]) - 1;
 }
 
-/* Refuse a volume outside the range [low, high] of one lung, or of all lungs if `lung` is NULL. */
+/* Refuse a volume outside the limits [low, high] of one lung, or of all lungs if `lung` is NULL.
+ * Limits are `margin` times the simulated range wider than this range, at both ends. */
 static supine_status refuse_volume(const char *lung, double volume, double low, double high,
                                    supine_error *error) {
+  const double wider = margin / (1 + 2 * margin) * (high - low);
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                          "%s%s hold%s %.0f to %.0f mL in the simulations of this posture, not "
-                          "%.0f mL: choose a volume in this range",
+                          "%s%s %s simulated at %.0f to %.0f mL in this posture, not at %.0f mL: "
+                          "choose a volume in this range",
                           lung == NULL ? "the lungs" : "lung ", lung == NULL ? "" : lung,
-                          lung == NULL ? "" : "s", low, high, volume);
+                          lung == NULL ? "were" : "was", low + wider, high - wider, volume);
 }
 
 /* Return whether a volume is outside the simulated range. */
@@ -160,34 +178,70 @@ static double follow(const path *p, double t, double *weights) {
   return supine_volume_form_at(&form, ones);
 }
 
+/* An interval of t, and how far the volume of the surface lies above the volume asked at its ends,
+ * mL. */
+typedef struct bracket {
+  double low, high;
+  double below, above;
+} bracket;
+
+static bool has_root(const bracket *b) {
+  return b->below <= close_enough && b->above >= -close_enough;
+}
+
 /* Find the weights of a lung at which it holds `volume`, by the rule of false position with the
- * Illinois correction, between t = low and t = high. Return whether there are any. */
-static bool solve(const path *p, double volume, double low, double high, double *weights) {
-  double below = follow(p, low, weights) - volume;
-  double above = follow(p, high, weights) - volume;
+ * Illinois correction and, if that is slow, by bisection, in a bracket that has a root. */
+static bool close_in(const path *p, double volume, bracket b, double *weights) {
   int side = 0;
-  if (!(below <= close_enough && above >= -close_enough)) {
-    return false;
-  }
-  for (int step = 0; step < 100; ++step) {
-    const double t = above > below ? (low * above - high * below) / (above - below) : low;
+  for (int step = 0; step < 200; ++step) {
+    const double middle = 0.5 * (b.low + b.high);
+    const double t = step < 100 && b.above > b.below
+                         ? (b.low * b.above - b.high * b.below) / (b.above - b.below)
+                         : middle;
     const double residual = follow(p, t, weights) - volume;
-    if (fabs(residual) <= close_enough || high - low < 1e-14) {
+    if (fabs(residual) <= close_enough || b.high - b.low < 1e-14) {
       return true;
     }
     if (residual > 0) {
-      high = t;
-      above = residual;
-      below *= side > 0 ? 0.5 : 1;
+      b.high = t;
+      b.above = residual;
+      b.below *= side > 0 ? 0.5 : 1;
       side = 1;
     } else {
-      low = t;
-      below = residual;
-      above *= side < 0 ? 0.5 : 1;
+      b.low = t;
+      b.below = residual;
+      b.above *= side < 0 ? 0.5 : 1;
       side = -1;
     }
   }
   return false;
+}
+
+/* Find the weights of a lung at which it holds `volume` between t = low and t = high. A surface
+ * whose volume does not rise all the way has brackets inside: take the one nearest to t = `near`.
+ * Return whether there is a root. */
+static bool solve(const path *p, double volume, double low, double high, double near,
+                  double *weights) {
+  bracket whole = {low, high, follow(p, low, weights) - volume, follow(p, high, weights) - volume};
+  bracket best = whole;
+  bool found = has_root(&whole);
+  if (!found) {
+    bracket b = {low, low, whole.below, whole.below};
+    double nearest = INFINITY;
+    for (int step = 1; step <= SEARCH_STEPS; ++step) {
+      b.low = b.high;
+      b.below = b.above;
+      b.high = low + (high - low) * step / SEARCH_STEPS;
+      b.above = follow(p, b.high, weights) - volume;
+      const double distance = fabs(0.5 * (b.low + b.high) - near);
+      if (has_root(&b) && distance < nearest) {
+        nearest = distance;
+        best = b;
+        found = true;
+      }
+    }
+  }
+  return found && close_in(p, volume, best, weights);
 }
 
 /* Compute the weights of all lungs at which each holds its volume.
@@ -203,11 +257,20 @@ static supine_status solve_lungs(const supine_basis *basis, const double gravity
     const double reference = basis->info.reference_volume[lung];
     double *weights = pose->weights + lung * basis->info.mode_count;
     p.lung = lung;
-    if (is_outside(volumes[lung], limits[lung][0], limits[lung][1]) ||
-        !solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
-               map_to_unit(limits[lung][1], range) + beyond, weights)) {
+    if (is_outside(volumes[lung], limits[lung][0], limits[lung][1])) {
       return refuse_volume(basis->info.lung_names[lung], reference + volumes[lung],
                            reference + limits[lung][0], reference + limits[lung][1], error);
+    }
+    if (!solve(&p, volumes[lung], map_to_unit(limits[lung][0], range) - beyond,
+               map_to_unit(limits[lung][1], range) + beyond, map_to_unit(volumes[lung], range),
+               weights)) {
+      return supine_error_set(
+          error, SUPINE_ERROR_NUMERICAL,
+          "lung %s was simulated at %.0f to %.0f mL in this posture, but the fit "
+          "to the simulations has no surface that holds %.0f mL: simulate more "
+          "volumes, or choose another one",
+          basis->info.lung_names[lung], reference + limits[lung][0], reference + limits[lung][1],
+          reference + volumes[lung]);
     }
     for (size_t axis = 0; axis < 3; ++axis) {
       pose->gains[lung][axis] = 1;

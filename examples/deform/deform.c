@@ -24,7 +24,10 @@ int main(int argc, char **argv) {
   }
   size_t count = supine_basis_get_info(basis)->vertex_count;
   float *xyz = malloc(count * 3 * sizeof *xyz);
-  supine_deform(basis, &pose, xyz); /* all vertices */
+  if (xyz == NULL || supine_deform(basis, &pose, xyz) != SUPINE_OK) { /* all vertices */
+    fprintf(stderr, "no memory, or another basis's pose\n");
+    return 3;
+  }
   printf("%zu vertices; the first is at %g %g %g mm\n", count, xyz[0], xyz[1], xyz[2]);
   free(xyz);
   supine_basis_close(basis);

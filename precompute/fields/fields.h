@@ -8,9 +8,10 @@
  * fit is of gravity alone (order 0).
  *
  * The band and the order of a fit are the highest degrees of its harmonics and of its polynomials.
- * By default they are chosen by the error of runs that are left out: all runs of one direction, and
- * the runs of one volume between the smallest and the largest. More terms are chosen if they reduce
- * this error by more than 1 %. */
+ * By default they are chosen by the error of runs that are left out: each run alone, and the runs
+ * of one volume between the smallest and the largest. More terms are chosen if they reduce this
+ * error by more than 1 %. The error that is stated leaves out all runs of a direction in place of
+ * each run alone. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -43,7 +44,7 @@ supine_status supine_fields_load(const char *path, const supine_lungs *lungs,
                                  supine_error *error);
 void supine_fields_free(supine_fields *fields);
 
-enum { SUPINE_FIT_BAND_MAX = 11, SUPINE_FIT_ORDER_MAX = 4 };
+enum { SUPINE_FIT_BAND_MAX = 11, SUPINE_FIT_ORDER_MAX = 4, SUPINE_LIMIT_BAND_MAX = 11 };
 
 enum { SUPINE_FIT_SUSPECTS_MAX = 3 };
 
@@ -70,6 +71,12 @@ typedef struct supine_fit_report {
   size_t order;        /**< highest degree of the polynomials of volume */
   /** [order][band] relative RMS error of the runs left out; 0 if the runs do not determine it. */
   double error[SUPINE_FIT_ORDER_MAX + 1][SUPINE_FIT_BAND_MAX + 1];
+  /** Relative RMS error between the volumes, continued from lower orders; 0 if it was measured by
+   * leaving volumes out, or if there are no volumes. */
+  double between;
+  /** Relative RMS error between the volumes, measured or `between`; and what six volumes would make
+   * of it, a guess, or 0 if they gain nothing. */
+  double volume_error, six_volumes;
   /** Relative RMS error of the smallest and the largest volumes of each direction, predicted from
    * the others: an extrapolation; 0 if the others do not determine the fit. */
   double extrapolated;
@@ -91,6 +98,8 @@ typedef struct supine_fit {
   supine_run_groups
       groups;              /**< runs that are left out together: of a direction, then of a volume */
   size_t direction_groups; /**< how many of them are of a direction */
+  size_t inner_groups; /**< number of groups of a volume, also if the chosen fit cannot leave them
+                            out: `groups` then ends before them */
   supine_run_groups ends; /**< all runs of the smallest volume of their direction; of the largest */
   supine_regression chosen;
   double *gram; /**< [lungs, runs, runs] scalar products of any two fields in each lung, mm^2 */
@@ -141,8 +150,11 @@ supine_status supine_fields_count_from_scan(const supine_fit *fit, const double 
 /** What a basis needs to find the parameter of each lung from volumes (runtime/simulated.h).
  * Volumes are mL above the given surface. */
 typedef struct supine_simulated_volumes {
-  size_t share_count;     /**< number of polynomials of the total volume */
-  double limits[2][2][9]; /**< [lungs] smallest and largest volume, as harmonics to degree 2 */
+  size_t share_count; /**< number of polynomials of the total volume */
+  size_t limit_terms; /**< number of harmonics of the limits, of all degrees to some band */
+  /** [lungs, 2, limit_terms] smallest and largest simulated volume, and 1 % of this range beyond,
+   * as harmonics that have these values in the directions of the runs. */
+  double limits[2 * 2 * (SUPINE_LIMIT_BAND_MAX + 1) * (SUPINE_LIMIT_BAND_MAX + 1)];
   double shares[2][9][SUPINE_FIT_ORDER_MAX + 1]; /**< [lungs][harmonic][polynomial] */
   double total[2];                               /**< total volumes mapped to -1 and 1 */
 } supine_simulated_volumes;

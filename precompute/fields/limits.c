@@ -6,13 +6,21 @@
 
 #include <supine/sh.h>
 
+#include "base/lapack.h"
 #include "precompute/fields/fields.h"
 
-enum { LIMIT_BAND = 2, LIMIT_TERMS = 9 };
+/* Highest band of the shares of the lungs. */
+enum { SHARE_BAND = 2 };
+
+/* Part of the simulated range by which the limits lie outside it, at both ends. */
+static const double margin = 0.01;
+
+/* How smooth limits are between the directions. */
+static const double smoothness = 4.0;
 
 /* Return the highest band, at most 2, that the chosen fit has too. */
-static size_t limit_band(const supine_fit *fit) {
-  return fit->report.band < LIMIT_BAND ? fit->report.band : LIMIT_BAND;
+static size_t share_band(const supine_fit *fit) {
+  return fit->report.band < SHARE_BAND ? fit->report.band : SHARE_BAND;
 }
 
 /* For each direction of gravity, find the smallest or largest volume of a lung.
@@ -35,33 +43,75 @@ static void find_ends(const supine_fit *fit, size_t lung, int side, double *grav
   }
 }
 
-/* Fit harmonics to the ends of the simulated range, and move the constant outwards by twice the
- * largest residual: once so that no simulated volume lies outside, and once as the fit errs as much
- * in directions that were not simulated. */
-static supine_status fit_limit(const supine_fit *fit, size_t lung, int side,
-                               double limit[LIMIT_TERMS]) {
-  static const double constant = 0.28209479177387814; /* Y(0, 0) */
+/* Return the lowest band that has as many harmonics as there are directions, at most
+ * LIMIT_BAND_MAX.
+ */
+static size_t interpolating_band(size_t directions) {
+  size_t band = 0;
+  while (band < SUPINE_LIMIT_BAND_MAX && supine_sh_count(band) < directions) {
+    ++band;
+  }
+  return band;
+}
+
+/* Return the degree of a harmonic by its index. */
+static double degree_of(size_t term) {
+  return floor(sqrt((double)term));
+}
+
+/* Interpolate values at directions by the smoothest harmonics c that have them (a spline on the
+ * sphere):
+ *
+ *     c = W Y^T (Y W Y^T)^-1 values,    W = (1 + l (l + 1))^-smoothness
+ *
+ * If there are more directions than harmonics, the values are met approximately.
+ * @param values  [directions], changed
+ * @param c       [terms] written */
+static supine_status interpolate(size_t directions, const double *gravity, size_t band,
+                                 double *values, double *c) {
+  const int d = (int)directions;
+  const size_t terms = supine_sh_count(band);
+  const int p = (int)terms;
+  SUPINE_ARENA arena = {0};
+  double *y = supine_arena_take(&arena, directions * terms, sizeof *y);
+  double *weighted = supine_arena_take(&arena, directions * terms, sizeof *weighted);
+  double *k = supine_arena_take(&arena, directions * directions, sizeof *k);
+  SUPINE_TRY(supine_arena_status(&arena));
+  for (size_t i = 0; i < directions; ++i) {
+    SUPINE_TRY(supine_sh_evaluate(band, gravity + 3 * i, y + i * terms));
+  }
+  for (size_t i = 0; i < directions * terms; ++i) {
+    const double l = degree_of(i % terms);
+    weighted[i] = y[i] * pow(1.0 + l * (l + 1.0), -smoothness);
+  }
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, d, d, p, 1.0, y, p, weighted, p, 0.0, k, d);
+  const double ridge = 1e-10 * cblas_dasum(d, k, d + 1) / (double)directions;
+  for (size_t i = 0; i < directions; ++i) {
+    k[i * directions + i] += ridge;
+  }
+  SUPINE_TRY(supine_lapack_status(LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', d, 1, k, d, values, 1)));
+  cblas_dgemv(CblasRowMajor, CblasTrans, d, p, 1.0, weighted, p, values, 1, 0.0, c, 1);
+  return SUPINE_OK;
+}
+
+/* Interpolate the ends of the simulated range of a lung, and move them outwards by a part of it.
+ * @param limit  [2, limit_terms] written */
+static supine_status fit_limits(const supine_fit *fit, size_t lung, size_t band, double *limit) {
   const size_t directions = fit->direction_groups;
-  const size_t terms = supine_sh_count(limit_band(fit));
   SUPINE_ARENA arena = {0};
   double *gravity = supine_arena_take(&arena, 3 * directions, sizeof *gravity);
-  double *volume = supine_arena_take(&arena, directions, sizeof *volume);
-  supine_regression fitted;
+  double *low = supine_arena_take(&arena, directions, sizeof *low);
+  double *high = supine_arena_take(&arena, directions, sizeof *high);
   SUPINE_TRY(supine_arena_status(&arena));
-  find_ends(fit, lung, side, gravity, volume);
-  const supine_runs runs = {.count = directions, .part_count = 1, .gravity = gravity};
-  SUPINE_TRY(supine_fields_regression_create(&runs, limit_band(fit), 0, &arena, &fitted));
-  double outside = 0.0; /* largest residual, mL */
-  for (size_t t = 0; t < LIMIT_TERMS; ++t) {
-    limit[t] =
-        t < terms ? cblas_ddot((int)directions, fitted.pinv + t * directions, 1, volume, 1) : 0.0;
+  find_ends(fit, lung, 0, gravity, low);
+  find_ends(fit, lung, 1, gravity, high);
+  for (size_t i = 0; i < directions; ++i) {
+    const double more = margin * (high[i] - low[i]);
+    low[i] -= more;
+    high[i] += more;
   }
-  for (size_t d = 0; d < directions; ++d) {
-    const double found = cblas_ddot((int)terms, fitted.values + d * terms, 1, limit, 1);
-    outside = fmax(outside, fabs(found - volume[d]));
-  }
-  limit[0] += (side == 0 ? -2.0 : 2.0) * outside / constant;
-  return SUPINE_OK;
+  SUPINE_TRY(interpolate(directions, gravity, band, low, limit));
+  return interpolate(directions, gravity, band, high, limit + supine_sh_count(band));
 }
 
 /* Fit the volume of each lung by functions of gravity and of the total volume. As the total is one
@@ -69,7 +119,7 @@ static supine_status fit_limit(const supine_fit *fit, size_t lung, int side,
 static supine_status fit_shares(const supine_fit *fit, supine_simulated_volumes *made) {
   const size_t m = fit->fields->run_count;
   const size_t order = fit->report.order;
-  const size_t terms = supine_sh_terms(limit_band(fit), order);
+  const size_t terms = supine_sh_terms(share_band(fit), order);
   SUPINE_ARENA arena = {0};
   double *total = supine_arena_zeros(&arena, m, sizeof *total);
   supine_regression fitted;
@@ -87,7 +137,7 @@ static supine_status fit_shares(const supine_fit *fit, supine_simulated_volumes 
   }
   const supine_runs runs = {
       .count = m, .part_count = 1, .gravity = fit->fields->directions, .volume = total};
-  SUPINE_TRY(supine_fields_regression_create(&runs, limit_band(fit), order, &arena, &fitted));
+  SUPINE_TRY(supine_fields_regression_create(&runs, share_band(fit), order, &arena, &fitted));
   for (size_t lung = 0; lung < fit->lungs->lung_count; ++lung) {
     for (size_t t = 0; t < terms; ++t) {
       made->shares[lung][t / (order + 1)][t % (order + 1)] =
@@ -101,8 +151,10 @@ supine_status supine_fields_volumes_fit(const supine_fit *fit, supine_simulated_
                                         supine_error *error) {
   *made = (supine_simulated_volumes){.share_count = fit->report.order + 1};
   supine_status status = fit_shares(fit, made);
-  for (size_t end = 0; status == SUPINE_OK && end < 2 * fit->lungs->lung_count; ++end) {
-    status = fit_limit(fit, end / 2, (int)(end % 2), made->limits[end / 2][end % 2]);
+  const size_t band = interpolating_band(fit->direction_groups);
+  made->limit_terms = supine_sh_count(band);
+  for (size_t lung = 0; status == SUPINE_OK && lung < fit->lungs->lung_count; ++lung) {
+    status = fit_limits(fit, lung, band, made->limits + 2 * lung * made->limit_terms);
   }
   SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "the simulated volumes: %s",
                    supine_status_string(status));

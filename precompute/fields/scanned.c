@@ -12,13 +12,19 @@
 supine_status supine_fields_check_scan(const supine_fit *fit, const double gravity[3],
                                        supine_error *error) {
   supine_simulated_volumes simulated;
-  double y[9];
+  double y[(SUPINE_LIMIT_BAND_MAX + 1) * (SUPINE_LIMIT_BAND_MAX + 1)];
+  size_t band = 0;
   SUPINE_TRY(supine_fields_volumes_fit(fit, &simulated, error));
-  SUPINE_TRY(supine_sh_evaluate(2, gravity, y));
+  const int terms = (int)simulated.limit_terms;
+  while (supine_sh_count(band) < simulated.limit_terms) {
+    ++band;
+  }
+  SUPINE_TRY(supine_sh_evaluate(band, gravity, y));
   for (size_t lung = 0; lung < fit->lungs->lung_count; ++lung) {
     const double held = fit->lungs->volume[lung];
-    const double low = cblas_ddot(9, simulated.limits[lung][0], 1, y, 1);
-    const double high = cblas_ddot(9, simulated.limits[lung][1], 1, y, 1);
+    const double *limits = simulated.limits + 2 * lung * simulated.limit_terms;
+    const double low = cblas_ddot(terms, limits, 1, y, 1);
+    const double high = cblas_ddot(terms, limits + terms, 1, y, 1);
     SUPINE_REFUSE_IF(
         !(low <= 0.0 && high >= 0.0), error, SUPINE_ERROR_ARGUMENT,
         "in the posture of the scan, the %s lung was simulated at %.0f to %.0f mL, but "

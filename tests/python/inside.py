@@ -150,7 +150,10 @@ for wrong in (float("nan"), float("inf")):
     own.weights[0] = wrong
     refused(supine.ArgumentError, "not finite", lungs.deform, own)
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
-refused(supine.UnsupportedError, "without normals", supine.open(path, normals=False).deform_lit, pose)
+unlit = supine.open(path, normals=False)  # normals of the triangles, then
+own = unlit.pose("prone")
+xyz, normals = unlit.deform_lit(own)
+assert (xyz == unlit.deform(own)).all() and np.abs(normals - unlit.normals(xyz)).max() < 1e-6
 assert issubclass(supine.NumericalError, supine.Error) and issubclass(supine.Error, Exception)
 # These exceptions are raised by the package itself, not for an error in the C library.
 refused(ValueError, "float32", lungs.deform, pose, np.empty((n, 3)))

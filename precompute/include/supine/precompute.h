@@ -225,6 +225,9 @@ typedef struct supine_precompute_report {
   double extrapolated;  /**< of fields over volume: relative RMS error of the smallest and the
                            largest volumes, predicted from the others; 0 if unknown */
   size_t cluster_count; /**< clusters of vertices that move alike; 0 if modes are stored */
+  /** Of fields over volume: relative RMS error between the volumes; and what six volumes for each
+   * direction would make of it, or 0 if they gain nothing. */
+  double volume_error, six_volumes;
   /** Of fields: RMS displacement of all runs, mm; the direction of gravity nearest to that of
    * supine posture, LPS; and the mean displacement along gravity in it, mm. */
   double displacement, nearest_supine[3], along_gravity;

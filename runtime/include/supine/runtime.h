@@ -416,21 +416,23 @@ SUPINE_API supine_status supine_basis_normal_weights(const supine_basis *basis,
                                                      const supine_pose *pose,
                                                      double *normal_weights);
 
-/** Compute the positions of supine_deform and unit normals, without a pass over the triangles:
+/** Compute the positions of supine_deform and unit normals. If the file has vectors of normals
+ * (supine_basis_info.normal_count), this needs no pass over the triangles:
  *
  *     n_i = sum over j of v_j n_ij, normalised
  *
  * The vectors n_ij of vertex i are supine_basis_info.normals. Their weights v_j in this pose are
  * those of supine_basis_normal_weights. Cost of a normal: 3 Q + 8 multiplications for Q vectors,
- * and as many additions.
+ * and as many additions. Without these vectors, as in many bases of another simulator's fields and
+ * after opening with without_normals, the normals are those of supine_normals: one pass over all
+ * triangles for each call.
  *
  * The metadata of the file state how far these normals turn away from those of supine_normals:
  * "normals_mean_degrees" is the mean angle, "normals_p999_degrees" the 99.9th percentile. Both were
  * measured in held-out states. Angles are larger for volumes outside the range "normals_range_ml".
  * A file without a volume at rest has "normals_range_mm" instead, for the largest displacement.
  * @param xyz      [N, 3] mm, written; NULL to compute only normals
- * @param normals  [N, 3], written; 0 for a vertex without triangles
- * @retval SUPINE_ERROR_UNSUPPORTED  the file has no normals, or it was opened without_normals */
+ * @param normals  [N, 3], written; 0 for a vertex without triangles */
 SUPINE_API supine_status supine_deform_lit(const supine_basis *basis, const supine_pose *pose,
                                            float *xyz, float *normals);
 

@@ -496,7 +496,7 @@ class Basis:
 
     def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
-        """Compute positions, and unit normals from vectors in the file instead of triangles. Requires `has_normals`."""
+        """Compute positions and unit normals: from vectors in the file if it `has_normals`, or else from the triangles."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals

@@ -244,7 +244,7 @@ class Report(ctypes.Structure):
                 ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
                 ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
                 ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t), ("extrapolated", c_double),
-                ("cluster_count", c_size_t), ("displacement", c_double), ("nearest_supine", c_double * 3),
+                ("cluster_count", c_size_t), ("volume_error", c_double), ("six_volumes", c_double), ("displacement", c_double), ("nearest_supine", c_double * 3),
                 ("along_gravity", c_double), ("turning_rms", c_double)]
 
 
