@@ -368,6 +368,52 @@ class Basis:
                           _address(sigma, self.vertex_count, "sigma"))
         return sigma
 
+    def _doubt(self, states: Sequence[Gravity], since: Optional[Gravity], another_day: bool) -> tuple[Any, Any]:
+        """Prepare the random field of the expected error; return it, and the memory that it needs."""
+        space, field = np.empty(_c.doubt_space(len(states))), ctypes.c_void_p()
+        given = (_c.State * len(states))(*(_state(state) for state in states))
+        origin = None if since is None else ctypes.pointer(_state(since))
+        _c.doubt_prepare(_c.DoubtTask(self._c, len(states), given, origin, another_day), space.ctypes.data, field)
+        return field, space
+
+    def covariance(self, vertices: Sequence[int], states: Union[Gravity, Sequence[Gravity]], since: Optional[Gravity] = None,
+                   *, another_day: bool = False) -> tuple[Doubles, Doubles]:
+        """Compute the predicted positions [S, n, 3] of n vertices in S states, mm, and the covariance [S, n, 3, S, n, 3] of
+        their errors, mm^2. Errors of neighbours are alike: the error of a distance, of a mean or of a plan follows from the
+        covariance, never from `expected_error` alone. Equations and evidence: <supine/doubt.h>.
+
+        since: state whose positions are exact, if it is not the scan's
+        another_day: whether the lungs are those of another day than the scan"""
+        wanted = [states] if isinstance(states, str) else list(states)
+        field, _space = self._doubt(wanted, since, another_day)
+        points = [(int(vertex), state) for state in range(len(wanted)) for vertex in vertices]
+        mean = np.empty((len(wanted), len(vertices), 3))
+        covariance = np.empty(mean.shape + mean.shape)
+        _c.doubt_covariance(field, len(points), (_c.DoubtPoint * len(points))(*points), mean.ctypes.data, covariance.ctypes.data)
+        return mean, covariance
+
+    def samples(self, state: Gravity, count: int, seed: int = 0, since: Optional[Gravity] = None, *,
+                another_day: bool = False) -> Floats:
+        """Draw `count` plausible lungs around those computed for a state: positions [count, N, 3], mm. Their spread is the
+        expected error, before the best translation is taken out (a factor of 1.15). Their volumes are not exact."""
+        field, _space = self._doubt([state], since, another_day)
+        made = np.empty((count, self.vertex_count, 3), _FLOAT)
+        for index in range(count):
+            _c.doubt_sample(field, 0, seed, index, made[index].ctypes.data)
+        return made
+
+    def registered_error(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
+                         another_day: bool = False) -> Floats:
+        """Compute the expected error [N] of the vertices, mm (3-D RMS), that remains after a rigid registration at fiducials,
+        vertices of this basis: the target registration error. Give at least three, spread around the targets."""
+        field, _space = self._doubt([state], since, another_day)
+        places = (ctypes.c_size_t * len(fiducials))(*map(int, fiducials))
+        space, frame = np.empty(_c.doubt_frame_space(len(fiducials))), ctypes.c_void_p()
+        _c.doubt_frame_prepare(field, len(fiducials), places, space.ctypes.data, frame)
+        sigma = np.empty(self.vertex_count, _FLOAT)
+        _c.doubt_frame_errors(frame, 0, self.vertex_count, sigma.ctypes.data)
+        return sigma
+
     def targets(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> list[Target]:
         """Compute where each named structure of a basis made by `embed` is in a state, and how far it has moved from
         the state `since`, or from the scan. The numbers are those of `supine deform -o FILE.csv`."""

@@ -1,0 +1,308 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Test the expected error as a random field: covariance, registration at fiducials, samples. */
+#include "tests/helpers/test.h"
+
+#include <supine/doubt.h>
+
+#include "runtime/kriging.h"
+#include "tests/helpers/runtime_fixture.h"
+
+enum { VERTICES = 40, STATES = 4, PER_STATE = 6, POINTS = STATES * PER_STATE, SIZE = 3 * POINTS };
+
+static const char *const names[STATES] = {"supine:rest", "prone:rest", "left:rest+300", "2000mL"};
+
+typedef struct world {
+  unsigned char *bytes;
+  supine_basis *basis;
+  supine_state states[STATES];
+  double *space;
+  const supine_doubt *doubt;
+  supine_doubt_point points[POINTS];
+  double mean[3 * POINTS], covariance[SIZE * SIZE];
+} world;
+
+static const supine_doubt *prepare(world *w, bool another_day, double *space) {
+  const supine_doubt_task task = {
+      .basis = w->basis, .state_count = STATES, .states = w->states, .another_day = another_day};
+  const supine_doubt *doubt = NULL;
+  supine_error error = {0};
+  if (supine_doubt_prepare(&task, space, &doubt, &error) != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return doubt;
+}
+
+static int setup(void **state) {
+  static const double resting[18] = {850 * -3.5449077018110318, 0, 0, 0, 0, 0, 0, 0, 0,
+                                     850 * -3.5449077018110318};
+  world *w = fixture_allocate(1, sizeof *w);
+  fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
+  size_t size = 0;
+  f->resting = resting;
+  w->bytes = fixture_bytes(f, &size);
+  fixture_destroy(f);
+  assert_int_equal(supine_basis_open_memory(w->bytes, size, &w->basis, NULL), SUPINE_OK);
+  for (size_t s = 0; s < STATES; ++s) {
+    w->states[s].gravity[1] = 1;
+    assert_int_equal(supine_state_parse(names[s], &w->states[s], NULL), SUPINE_OK);
+  }
+  for (size_t i = 0; i < POINTS; ++i) {
+    w->points[i] = (supine_doubt_point){i % PER_STATE * 6 + 4, i / PER_STATE};
+  }
+  w->space = fixture_allocate(supine_doubt_space(STATES), sizeof *w->space);
+  w->doubt = prepare(w, false, w->space);
+  assert_int_equal(
+      supine_doubt_covariance(w->doubt, POINTS, w->points, w->mean, w->covariance, NULL),
+      SUPINE_OK);
+  *state = w;
+  return 0;
+}
+
+static int teardown(void **state) {
+  world *w = *state;
+  supine_basis_close(w->basis);
+  free(w->bytes);
+  free(w->space);
+  free(w);
+  return 0;
+}
+
+/* Where no volume is assumed and the posture stays, all of the error is a kernel. */
+TEST(test_covariance_known_volume_equals_kernel_of_expected_error) {
+  const world *w = *state;
+  const size_t first = SIZE / STATES * (STATES - 1); /* of the last state, supine and 2000 mL */
+  const float *vertices = supine_basis_vertices(w->basis);
+  float sigma[VERTICES];
+  assert_int_equal(supine_expected_error(w->basis, &w->states[STATES - 1], NULL, sigma, NULL),
+                   SUPINE_OK);
+  for (size_t i = 0; i < PER_STATE; ++i) {
+    for (size_t j = 0; j < PER_STATE; ++j) {
+      const size_t at[2] = {w->points[i].vertex, w->points[j].vertex};
+      double square = 0;
+      for (size_t k = 0; k < 3; ++k) {
+        square += pow((double)vertices[3 * at[0] + k] - (double)vertices[3 * at[1] + k], 2);
+      }
+      const double a = sqrt(3 * square) / 90;
+      const double lungs = (at[0] < VERTICES / 2) == (at[1] < VERTICES / 2) ? 1 : 1 / 3.0;
+      const double expected =
+          4.0 / 9 * (double)sigma[at[0]] * (double)sigma[at[1]] * lungs * (1 + a) * exp(-a);
+      const double *block = w->covariance + (first + 3 * i) * SIZE + first + 3 * j;
+      assert_close(block[0], expected, 1e-5 * expected);
+      assert_close(block[2 * SIZE + 2], expected, 1e-5 * expected);
+      assert_true(block[1] == 0 && block[SIZE] == 0);
+    }
+  }
+}
+
+/* The covariance of points in four states is symmetric and positive semidefinite, and its diagonal
+ * lies between the square of the expected error and 4/3 of it. */
+TEST(test_covariance_several_states_positive) {
+  world *w = *state;
+  static double factor[SIZE * SIZE];
+  memcpy(factor, w->covariance, sizeof factor);
+  for (size_t i = 0; i < SIZE; ++i) {
+    for (size_t j = 0; j < SIZE; ++j) {
+      assert_true(factor[i * SIZE + j] == factor[j * SIZE + i]);
+    }
+  }
+  for (size_t i = 0; i < SIZE; ++i) {
+    factor[i * SIZE + i] += 1e-9 * w->covariance[0];
+  }
+  assert_true(supine_kriging_factor(SIZE, factor));
+  for (size_t i = 0; i < POINTS; ++i) {
+    float sigma[VERTICES];
+    double trace = 0;
+    const supine_doubt_point *p = &w->points[i];
+    assert_int_equal(supine_expected_error(w->basis, &w->states[p->state], NULL, sigma, NULL),
+                     SUPINE_OK);
+    const double square = (double)sigma[p->vertex] * (double)sigma[p->vertex];
+    for (size_t k = 0; k < 3; ++k) {
+      trace += w->covariance[(3 * i + k) * (SIZE + 1)];
+    }
+    assert_true(trace > square * (1 - 1e-5) && trace < 4.0 / 3 * square * (1 + 1e-5));
+  }
+}
+
+/* Another day adds the same kernel with 6.2 mm. */
+TEST(test_covariance_another_day_adds_its_kernel) {
+  world *w = *state;
+  static double other[SIZE * SIZE];
+  double *space = fixture_allocate(supine_doubt_space(STATES), sizeof *space);
+  const supine_doubt *doubt = prepare(w, true, space);
+  assert_int_equal(supine_doubt_covariance(doubt, POINTS, w->points, NULL, other, NULL), SUPINE_OK);
+  assert_close(other[0] - w->covariance[0], 4.0 / 9 * 6.2 * 6.2, 1e-9);
+  /* the same vertex in two states is on the same day */
+  const size_t next = SIZE / STATES;
+  assert_close(other[next] - w->covariance[next], 4.0 / 9 * 6.2 * 6.2, 1e-9);
+  free(space);
+}
+
+/* Solve a x = b [6] in place by elimination. */
+static void solve(double a[6][6], double b[6]) {
+  for (size_t k = 0; k < 6; ++k) {
+    for (size_t r = 0; r < 6; ++r) {
+      const double factor = r == k ? 0 : a[r][k] / a[k][k];
+      for (size_t c = 0; c < 6; ++c) {
+        a[r][c] -= factor * a[k][c];
+      }
+      b[r] -= factor * b[k];
+    }
+  }
+  for (size_t k = 0; k < 6; ++k) {
+    b[k] /= a[k][k];
+  }
+}
+
+/* Add translation + rotation x (p - c) of six parameters. */
+static void add_motion(const double y[6], const double p[3], const double c[3], double factor,
+                       double moved[3]) {
+  const double v[3] = {p[0] - c[0], p[1] - c[1], p[2] - c[2]};
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t i = (k + 1) % 3;
+    const size_t j = (k + 2) % 3;
+    moved[k] += factor * (y[k] + y[3 + i] * v[j] - y[3 + j] * v[i]);
+  }
+}
+
+/* After a registration, the stated errors are those of random lungs that are registered by least
+ * squares, and smaller than before near the fiducials. */
+TEST(test_frame_errors_equal_those_of_registered_samples) {
+  enum { FIDUCIALS = 5, SAMPLES = 500 };
+  world *w = *state;
+  static const size_t at[FIDUCIALS] = {3, 11, 18, 25, 37};
+  double space[2000];
+  const supine_doubt_frame *frame = NULL;
+  float sigma[VERTICES];
+  float xyz[3 * VERTICES];
+  double predicted[3 * VERTICES];
+  double seen[VERTICES] = {0};
+  assert_true(supine_doubt_frame_space(FIDUCIALS) <= 2000);
+  assert_int_equal(supine_doubt_frame_prepare(w->doubt, FIDUCIALS, at, space, &frame, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_doubt_frame_errors(frame, 0, VERTICES, sigma), SUPINE_OK);
+  supine_pose pose;
+  assert_int_equal(supine_basis_pose(w->basis, &w->states[0], &pose, NULL), SUPINE_OK);
+  supine_deform(w->basis, &pose, xyz);
+  for (size_t i = 0; i < 3 * VERTICES; ++i) {
+    predicted[i] = (double)xyz[i];
+  }
+  double place[3 * VERTICES];
+  double centre[3] = {0};
+  for (size_t i = 0; i < 3 * VERTICES; ++i) {
+    place[i] = (double)supine_basis_vertices(w->basis)[i];
+  }
+  for (size_t i = 0; i < 3 * FIDUCIALS; ++i) {
+    centre[i % 3] += place[3 * at[i / 3] + i % 3] / FIDUCIALS;
+  }
+  for (size_t s = 0; s < SAMPLES; ++s) {
+    double normal[6][6] = {{0}};
+    double y[6] = {0};
+    assert_int_equal(supine_doubt_sample(w->doubt, 0, 11, s, xyz, NULL), SUPINE_OK);
+    for (size_t f = 0; f < FIDUCIALS; ++f) {
+      double column[6][3];
+      for (size_t e = 0; e < 6; ++e) {
+        const double unit[6] = {e == 0, e == 1, e == 2, e == 3, e == 4, e == 5};
+        memset(column[e], 0, sizeof column[e]);
+        add_motion(unit, place + 3 * at[f], centre, 1, column[e]);
+      }
+      for (size_t e = 0; e < 6; ++e) {
+        for (size_t k = 0; k < 3; ++k) {
+          y[e] += column[e][k] * ((double)xyz[3 * at[f] + k] - predicted[3 * at[f] + k]);
+          for (size_t g = 0; g < 6; ++g) {
+            normal[e][g] += column[e][k] * column[g][k];
+          }
+        }
+      }
+    }
+    solve(normal, y);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      double error[3];
+      for (size_t k = 0; k < 3; ++k) {
+        error[k] = (double)xyz[3 * i + k] - predicted[3 * i + k];
+      }
+      add_motion(y, place + 3 * i, centre, -1, error);
+      seen[i] += (error[0] * error[0] + error[1] * error[1] + error[2] * error[2]) / SAMPLES;
+    }
+  }
+  for (size_t i = 0; i < VERTICES; ++i) {
+    assert_true(sqrt(seen[i]) > 0.85 * (double)sigma[i] && sqrt(seen[i]) < 1.15 * (double)sigma[i]);
+  }
+  double rotation[9];
+  double translation[3];
+  supine_doubt_frame_motion(frame, rotation, translation);
+  assert_true(rotation[0] > 0.9 && rotation[4] > 0.9 && rotation[8] > 0.9);
+}
+
+/* Of 1000 samples, each variance is within 15 % of the formula, and the covariances within 5 % RMS
+ * of the variance. Seed and index decide a sample. */
+TEST(test_sample_thousand_have_the_covariance) {
+  enum { SAMPLES = 1000 };
+  world *w = *state;
+  static double found[SIZE * SIZE];
+  double deviation[SIZE];
+  float xyz[3 * VERTICES];
+  float again[3 * VERTICES];
+  memset(found, 0, sizeof found);
+  for (size_t s = 0; s < SAMPLES; ++s) {
+    for (size_t i = 0; i < POINTS; ++i) {
+      if (i % PER_STATE == 0) {
+        assert_int_equal(supine_doubt_sample(w->doubt, w->points[i].state, 5, s, xyz, NULL),
+                         SUPINE_OK);
+      }
+      for (size_t k = 0; k < 3; ++k) {
+        deviation[3 * i + k] = (double)xyz[3 * w->points[i].vertex + k] - w->mean[3 * i + k];
+      }
+    }
+    for (size_t e = 0; e < (size_t)SIZE * SIZE; ++e) {
+      found[e] += deviation[e / SIZE] * deviation[e % SIZE] / SAMPLES;
+    }
+  }
+  double sum = 0;
+  for (size_t e = 0; e < (size_t)SIZE * SIZE; ++e) {
+    const size_t i = e / SIZE;
+    const size_t j = e % SIZE;
+    const double scale = sqrt(w->covariance[i * SIZE + i] * w->covariance[j * SIZE + j]);
+    sum += pow((found[e] - w->covariance[e]) / scale, 2) / (SIZE * SIZE);
+    assert_true(i != j || fabs(found[e] / scale - 1) < 0.15);
+  }
+  print_message("covariances of samples differ by %.3f of the variance (RMS)\n", sqrt(sum));
+  assert_true(sqrt(sum) < 0.05);
+  assert_int_equal(supine_doubt_sample(w->doubt, 3, 5, SAMPLES - 1, again, NULL), SUPINE_OK);
+  assert_memory_equal(again, xyz, sizeof again);
+  assert_int_equal(supine_doubt_sample(w->doubt, 3, 6, SAMPLES - 1, again, NULL), SUPINE_OK);
+  assert_memory_not_equal(again, xyz, sizeof again);
+}
+
+TEST(test_doubt_wrong_input_refused) {
+  world *w = *state;
+  supine_error error = {0};
+  double space[4000];
+  float xyz[3 * VERTICES];
+  const supine_doubt *doubt = NULL;
+  const supine_doubt_frame *frame = NULL;
+  const supine_doubt_point bad[2] = {{VERTICES, 0}, {0, STATES}};
+  supine_doubt_task task = {.basis = w->basis, .states = w->states};
+  assert_int_equal(supine_doubt_prepare(&task, space, &doubt, &error), SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "0 states: give 1 to 16");
+  for (size_t i = 0; i < 2; ++i) {
+    assert_int_equal(supine_doubt_covariance(w->doubt, 1, &bad[i], NULL, w->covariance, &error),
+                     SUPINE_ERROR_ARGUMENT);
+    assert_says(error.message, "point 1 is vertex");
+  }
+  assert_int_equal(supine_doubt_sample(w->doubt, STATES, 1, 1, xyz, &error), SUPINE_ERROR_ARGUMENT);
+  assert_int_equal(
+      supine_doubt_frame_prepare(w->doubt, 2, (const size_t[]){1, 2}, space, &frame, &error),
+      SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "2 points of the frame: give 3 to 300");
+  assert_int_equal(
+      supine_doubt_frame_prepare(w->doubt, 3, (const size_t[]){5, 5, 9}, space, &frame, &error),
+      SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "from one line");
+  assert_int_equal(supine_doubt_frame_prepare(w->doubt, 3, (const size_t[]){5, VERTICES, 9}, space,
+                                              &frame, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "give a vertex below");
+  assert_null(frame);
+}
+
+TEST_GROUP(setup, teardown)
