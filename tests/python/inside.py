@@ -54,6 +54,20 @@ kept, first = supine.open(path).vertices, lungs.vertices.copy()
 gc.collect()
 assert (kept == first).all()
 
+# The errors of two vertices in two states have a covariance; samples and registrations follow from it.
+mean, covariance = lungs.covariance([0, 5, n - 1], ["supine:rest", "prone:rest"])
+assert mean.shape == (2, 3, 3) and covariance.shape == (2, 3, 3, 2, 3, 3)
+square = covariance.reshape(18, 18)
+assert (square == square.T).all() and np.linalg.eigvalsh(square).min() > -1e-9 * square.max()
+assert np.abs(mean[1] - lungs.deform(lungs.pose("prone:rest"))[[0, 5, n - 1]]).max() < 1e-3
+other = lungs.covariance([0], "supine:rest", another_day=True)[1]
+assert abs(other[0, 0, 0, 0, 0, 0] - square[0, 0] - 4 / 9 * 6.2 ** 2) < 1e-9
+drawn = lungs.samples("supine:rest", 2, seed=3)
+assert drawn.shape == (2, n, 3) and (drawn[0] != drawn[1]).any() and (drawn == lungs.samples("supine:rest", 2, seed=3)).all()
+left = lungs.registered_error("prone:rest", [0, n // 4, n // 2, n - 1])
+assert left.shape == (n,) and (left > 0).all() and left[0] < lungs.expected_error("prone:rest")[0] * (4 / 3) ** .5
+refused(supine.ArgumentError, "2 points of the frame", lungs.registered_error, "prone", [0, 1])
+
 # A basis of clusters has computed coefficients. In fields over gravity and volume, each lung has weights of its own.
 for name, shape in (("clusters", (5,)), ("simulated", (2, 2))):
     other = supine.open(f"{name}.safetensors", storage="exact")
