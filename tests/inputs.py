@@ -6,12 +6,14 @@ show the verdicts: taken, told (a warning) or refused. All interfaces must give 
 
 The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target `npm`
 was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
+import ctypes
 import os
 import struct
 import sys
 
 from helpers.verdict import SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table, transform, write_ply
 import numpy as np
+from supine import _library as c
 
 INTERFACES = ("command", "C", "Python", "JavaScript")
 

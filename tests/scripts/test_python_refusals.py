@@ -108,6 +108,7 @@ for case in (
         (ValueError, "give each point a name of its own", supine.embed, lungs, {"n": np.zeros((3, 3)), "m": np.zeros((3, 3))}),
         (ValueError, "points must be [n, 3]", supine.embed, lungs, np.zeros((2, 2))),
         (ValueError, "expected points [P, 3]", supine.save_fields, "f", points, points, points),
+        (ValueError, "expected the run of each row", supine.save_fields, "f", points, points, np.zeros((4, 4, 3)), [1, 2]),
         (supine.ReadError, "cannot read", supine.precompute, "absent.ply"),
         (supine.Error, "", supine.precompute, points, corners),
         (KeyboardInterrupt, "stopped by the caller", lambda: supine.precompute("lungs.ply", progress=stop))):
