@@ -79,6 +79,7 @@ def fill(options):
 for case in (
         (ValueError, "gravity must be 3 numbers", supine.tilt, (0, 1), 5),
         (bad, "not finite", supine.tilt, (0, 1, np.nan), 5),
+        (bad, "has no unit and no reference", lungs.pose, "prone", 500), (bad, "the volume is list", lungs.pose, "prone", ["rest"]),
         (bad, "the gain is nan", lungs.pose("prone").fill, np.nan),
         (ValueError, "of type float32", lungs.deform, lungs.pose("prone"), np.empty(3)),
         (ValueError, "must be contiguous", lungs.deform, lungs.pose("prone"), np.empty((3, n), np.float32).T),

@@ -134,6 +134,9 @@ class Pose(_c.CPose):
     """The weights of modes and the gains (factors of displacement) of a state of a basis, made by `Basis.pose`."""
     _made: Optional[tuple[Any, Any]] = None  # the open basis and the direction of gravity
 
+    def __reduce__(self) -> Any:
+        return _restore_pose, (bytes(self),)  # without the basis, which is pickled by itself
+
     def fill(self, gain: float) -> Pose:
         """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces. Volumes that
         lungs cannot hold are refused, as by `Basis.pose`."""
@@ -144,6 +147,10 @@ class Pose(_c.CPose):
             _c.basis_pose_gain(owner.pointer, gravity, gain, Pose())
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
+
+
+def _restore_pose(content: bytes) -> Pose:
+    return Pose.from_buffer_copy(content)
 
 
 def _address(array: Floats, count: int, name: str, writable: bool = True) -> int:
