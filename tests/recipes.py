@@ -179,7 +179,7 @@ def see(supine):
     print("what was added works:", flush=True)
     lung = "examples/lungs/left.obj"
     text = run(supine, "precompute", lung, "--law", "even", "--band", "5", "--without-normals", "-o", "even.safetensors")
-    check("even law" in text, "precompute names the law")
+    check("law of displacement: even" in text, "precompute names the law")
     run(supine, "precompute", lung, "--band", "5", "--without-normals", "-o", "deep.safetensors")
     text = run(supine, "info", "even.safetensors", "--json")
     check("base=1.05 gain=0 cx=0 cy=0 cz=0" in text and '"even"' in text, "info has the law's constants")
