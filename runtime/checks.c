@@ -64,6 +64,7 @@ bool supine_basis_allows_folds(const supine_basis *basis) {
 static bool can_hold(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
                      char *wrong, size_t size) {
   const supine_basis_info *info = &basis->info;
+  const double most = supine_input_get(SUPINE_INPUT_VOLUME_MOST)->refused;
   double volumes[SUPINE_LUNGS_MAX];
   double total = 0;
   double full = 0;
@@ -94,6 +95,9 @@ static bool can_hold(const supine_basis *basis, const supine_state *state, const
       continue;
     }
     find_range(basis, state->gravity, lung, range);
+    if (range[1] >= (1 - 1e-9) * most * own_full) { /* the surface does not fold up to there */
+      range[1] = fmax(range[1], volumes[lung]);
+    }
     if (!(volumes[lung] >= range[0] && volumes[lung] <= range[1])) {
       (void)supine_print_text(
           wrong, size,
