@@ -197,7 +197,7 @@ MISTAKES = {
                            "repeated": "left+15+15"}),
     "gravity": (None, "", {RIGHT: "0,-1,0", "range": "0,0,0", "finite": "0,nan,0", "cut": "0,-1",
                            "repeated": "0,-1,0,0,-1,0"}),
-    "breath": (None, "", {RIGHT: "500", "unit": "0.5", "range": "9000", "finite": "nan", "cut": ""}),
+    "breath": (None, "", {RIGHT: "500mL", "unit": "0.5mL", "range": "9000mL", "finite": "nanmL", "cut": "500"}),
     "height": (None, "", {RIGHT: "180", "unit": "1.8", "range": "500", "finite": "nan", "cut": ""}),
     "share": (None, "", {RIGHT: "left:0.5", "unit": "left:50", "range": "left:-1", "finite": "left:nan", "cut": "left:",
                          "repeated": "left:0.5:0.5"}),
@@ -320,11 +320,7 @@ KNOWN = {
     ("command embed LABELS", "mirror"): "belongs",
     ("command deform --image", "shifted"): "belongs",
     ("command embed MESH", "range"): "one road",
-    ("stream stream --volume", "range"): "one road",
-    **{(door, "unit"): "one road" for door in ("command compare --breath", "command export --breath",
-                                               "command breathe --tidal", "stream stream --tidal")},
     ("command compare --breath", "range"): "one road",
-    ("command export --breath", "range"): "one road",
 }
 
 
