@@ -154,7 +154,7 @@ def check_real():
 def check_guide():
     """A ball of 14 mm in the CT of the guide, with voxels of 4 mm."""
     lungs = os.path.join(guide, "..", "..", "examples", "lungs")
-    run(sys.executable, os.path.join(guide, "synthetic_ct.py"), *(os.path.join(lungs, f"{side}.ply") for side in ("left", "right")))
+    run(sys.executable, os.path.join(guide, "synthetic_ct.py"), *(os.path.join(lungs, f"{side}.obj") for side in ("left", "right")))
     run(supine, "precompute", "segmentation", "--scanned", "full", "--edge", 8, "--held-out", 20, "-o", "guide.safetensors")
     image = nibabel.load("ct.nii.gz")
     ct, affine = np.array(image.dataobj), image.affine
