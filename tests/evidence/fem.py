@@ -205,7 +205,8 @@ def follow_guide(supine, points, faces):
     """Run the commands and programs of docs/guide/simulator.md on the last simulations."""
     page = (pathlib.Path(__file__).resolve().parents[2] / "docs/guide/simulator.md").read_text("utf-8")
     supine._program._write_mesh("lung.ply", points, faces)  # pylint: disable=protected-access
-    np.savetxt("points.csv", points, delimiter=",")
+    np.savetxt("points.csv", points, delimiter=",")  # so that synthetic_simulator.py, which keeps what exists, does nothing
+    shutil.copy(pathlib.Path(__file__).resolve().parents[2] / "docs/guide/synthetic_simulator.py", ".")
     for language, text in re.findall(r"```(sh|python)\n(.*?)```", page, re.S):
         subprocess.run(["sh", "-euc", text] if language == "sh" else [sys.executable, "-c", text], check=True,
                        stdout=subprocess.DEVNULL)

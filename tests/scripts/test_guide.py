@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the code blocks of the guide: test_guide.py SOURCE_FOLDER PROGRAM LIBRARY CC [PAGE...]
 
-The blocks `sh` and `python` of each page run in order, in a folder with synthetic_ct.py. A block `sh not-run` may not call
+The blocks `sh` and `python` of each page run in order, in a folder with the programs of the guide. A block `sh not-run` may not call
 supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
 each page must show a picture, and make it. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
 
-The page simulator.md belongs to the test `fem`. Exit with 77 if numpy or nibabel is missing."""
+Exit with 77 if numpy or nibabel is missing."""
 import glob
 import os
 import re
@@ -35,15 +35,14 @@ def check_page(page):
     for link in re.findall(r"\]\(([^)#:]+)[^):]*\)", text):
         if not os.path.exists(os.path.join(guide, link)):
             faults.append(f"{name}: no file {link}")
-    if name == "simulator.md":
-        return
     with tempfile.TemporaryDirectory() as folder:
         os.mkdir(os.path.join(folder, "bin"))
         os.symlink(program, os.path.join(folder, "bin", "supine"))
         os.symlink(sys.executable, os.path.join(folder, "bin", "python3"))
         here = os.path.join(folder, "here")
         os.mkdir(here)
-        shutil.copy(os.path.join(guide, "synthetic_ct.py"), here)
+        for path in glob.glob(os.path.join(guide, "*.py")):
+            shutil.copy(path, here)
         shutil.copytree(os.path.join(source, "runtime/python/supine"), os.path.join(folder, "python/supine"))
         shutil.copy(library, os.path.join(folder, "python/supine/libsupine_runtime.so"))
         environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": f"{folder}/python",
