@@ -177,7 +177,7 @@ typedef struct supine_mesh_scalar {
   const float *values; /**< [vertex_count]; NULL if there is no number */
 } supine_mesh_scalar;
 
-enum { SUPINE_MESH_SCALARS = 2 };
+enum { SUPINE_MESH_SCALARS = 3 };
 
 /** How to write a file, and its optional contents. */
 typedef struct supine_mesh_save_options {

@@ -273,11 +273,12 @@ static double length_of(const supine_expected_model *m, double u[EXPECTED_POSES 
   return fmax(m->least, supine_length(u[0]));
 }
 
-/* Return V_i + V_h - 2 C_ih (supine_expected_relate), mm^2, for a vertex.
- * @param per_mm  squared error per mm of displacement of the term, mm
- * @param turned  whether the term belongs to the part of the displacement that a turn adds */
-static double relative_square(const supine_expected_model *m, double per_mm, bool turned,
-                              size_t vertex, double u[EXPECTED_POSES / 2][3]) {
+/* Return V_i + V_h - 2 C_ih (supine_expected_relate), mm^2, for a vertex. If u_i and u_h have the
+ * lengths `length` and `lengths`, mm, their variances are 4/3 c times these.
+ * @param per_mm   squared error per mm of displacement of the term, c, mm
+ * @param lengths  [anchors] */
+static double relative_square(const supine_expected_model *m, double per_mm, size_t vertex,
+                              double length, const double *lengths) {
   const supine_basis_info *info = supine_basis_get_info(m->basis);
   const float *p = supine_basis_vertices(m->basis) + 3 * vertex;
   const double at[3] = {(double)p[0], (double)p[1], (double)p[2]};
@@ -285,22 +286,39 @@ static double relative_square(const supine_expected_model *m, double per_mm, boo
   supine_kriging_model model = supine_kriging_default;
   model.sill = 4.0 / 3.0 * per_mm;
   model.least = 0.0;
-  double square = model.sill * length_of(m, u, turned);
+  double square = model.sill * length;
   for (size_t j = 0; j < m->anchor_count; ++j) {
-    supine_expected_anchor anchor = m->anchor[j];
-    const double size = length_of(m, anchor.u, turned);
+    const double *place = m->anchor[j].position;
     const bool same = vertex >= info->lung_begin[j] && vertex < info->lung_begin[j + 1];
     square -=
-        3.0 * 2.0 / count *
-        supine_kriging_covariance(&model, at, length_of(m, u, turned), anchor.position, size, same);
+        3.0 * 2.0 / count * supine_kriging_covariance(&model, at, length, place, lengths[j], same);
     for (size_t k = 0; k < m->anchor_count; ++k) {
-      supine_expected_anchor other = m->anchor[k];
       square += 3.0 / count / count *
-                supine_kriging_covariance(&model, anchor.position, size, other.position,
-                                          length_of(m, other.u, turned), j == k);
+                supine_kriging_covariance(&model, place, lengths[j], m->anchor[k].position,
+                                          lengths[k], j == k);
     }
   }
   return fmax(0, square);
+}
+
+/* Return relative_square of a displacement, or of the part of it that a turn adds. */
+static double relative_part(const supine_expected_model *m, double per_mm, bool turned,
+                            size_t vertex, double u[EXPECTED_POSES / 2][3]) {
+  double lengths[SUPINE_LUNGS_MAX];
+  for (size_t j = 0; j < m->anchor_count; ++j) {
+    supine_expected_anchor anchor = m->anchor[j];
+    lengths[j] = length_of(m, anchor.u, turned);
+  }
+  return relative_square(m, per_mm, vertex, length_of(m, u, turned), lengths);
+}
+
+double supine_expected_day_square(const supine_expected_model *m, size_t vertex) {
+  static const double square = SUPINE_ANOTHER_DAY_MM * SUPINE_ANOTHER_DAY_MM;
+  double lengths[SUPINE_LUNGS_MAX];
+  for (size_t j = 0; j < m->anchor_count; ++j) {
+    lengths[j] = 1;
+  }
+  return m->anchor_count == 0 ? square : relative_square(m, square, vertex, 1, lengths);
 }
 
 /* Replace the squared errors of a vertex by those relative to the mean of the anchors. */
@@ -317,8 +335,8 @@ static void relate_squares(const supine_expected_model *m, size_t vertex,
       slope[k] -= (anchor->u[1][k] - anchor->u[0][k]) / (double)m->anchor_count;
     }
   }
-  square[SUPINE_EXPECTED_DISPLACEMENT] = relative_square(m, m->law, false, vertex, u);
-  square[SUPINE_EXPECTED_TURN] = relative_square(m, m->turn, true, vertex, u);
+  square[SUPINE_EXPECTED_DISPLACEMENT] = relative_part(m, m->law, false, vertex, u);
+  square[SUPINE_EXPECTED_TURN] = relative_part(m, m->turn, true, vertex, u);
   square[SUPINE_EXPECTED_VOLUME] = m->per_step * m->per_step * supine_dot(slope, slope);
   square[SUPINE_EXPECTED_HEART] = pow(EXPECTED_HEART * m->across * b, 2);
 }
@@ -390,6 +408,10 @@ static supine_status evaluate_all(const supine_basis *basis, const supine_state 
     supine_expected_all(&model, sigma, mean);
   }
   return status;
+}
+
+double supine_expected_another_day(double same_session) {
+  return hypot(same_session, SUPINE_ANOTHER_DAY_MM);
 }
 
 supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,

@@ -120,6 +120,10 @@ void supine_expected_squares(const supine_expected_model *model, double u[EXPECT
  */
 void supine_expected_relate(supine_expected_model *model, const double *mean);
 
+/** Return the squared error, mm^2, by which another day adds to that of a vertex's position: that
+ * of SUPINE_ANOTHER_DAY_MM or, with anchors, that of the difference from their mean. */
+double supine_expected_day_square(const supine_expected_model *model, size_t vertex);
+
 /** Write the expected error of every vertex to `sigma`, if it is not NULL, and the mean squared
  * error of each term to `mean`. */
 void supine_expected_all(const supine_expected_model *model, float *sigma,

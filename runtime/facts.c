@@ -235,6 +235,14 @@ static supine_fact error_of(const supine_basis *basis) {
   return fact;
 }
 
+static supine_fact day_of(void) {
+  supine_fact fact = make_fact("change of the lungs to another day", SUPINE_SOURCE_MEASURED,
+                               "on landmarks of 9 people");
+  fact.value = SUPINE_ANOTHER_DAY_MM;
+  fact.unit = "mm";
+  return fact;
+}
+
 static supine_fact simulated_of(const supine_basis *basis) {
   supine_fact fact =
       make_fact("simulated volumes", SUPINE_SOURCE_SIMULATED, "by another simulator");
@@ -268,6 +276,7 @@ size_t supine_basis_facts(const supine_basis *basis, supine_fact facts[SUPINE_FA
   if (!info->is_fields) {
     facts[count++] = stiffness_of(basis);
     facts[count++] = error_of(basis);
+    facts[count++] = day_of();
   }
   return count;
 }

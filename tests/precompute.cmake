@@ -10,6 +10,14 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
     ${PROJECT_BINARY_DIR} ${SUPINE_LUNGS}/lungs ${SUPINE_LUNGS}/covid:RAS)
   set_tests_properties(evidence PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 endif()
+# Printed positions lie within their stated errors, and the term of another day is that of landmarks.
+if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
+  add_test(NAME positions COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/positions.py ${PROJECT_BINARY_DIR}
+    ${SUPINE_LUNGS}/copd)
+  add_test(NAME sessions COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/sessions.py
+    ${PROJECT_SOURCE_DIR}/runtime/include/supine/locate.h ${SUPINE_LUNGS}/sessions)
+  set_tests_properties(positions sessions PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
+endif()
 # Fields that CalculiX computes are compressed within the error that is stated.
 if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME fem COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/evidence/fem.py ${PROJECT_BINARY_DIR})

@@ -45,19 +45,22 @@ supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *po
 
 void supine_posed_expected_measure(size_t count, supine_expected *expected) {
   double square = 0.0;
+  double another = 0.0;
   expected->largest = 0.0;
   for (size_t i = 0; i < count; ++i) {
     square += (double)expected->sigma[i] * (double)expected->sigma[i];
+    another += (double)expected->another[i] * (double)expected->another[i];
     expected->largest = fmax(expected->largest, (double)expected->sigma[i]);
   }
   expected->rms = sqrt(square / (double)count);
+  expected->another_rms = sqrt(another / (double)count);
 }
 
 supine_status supine_posed_expected(const supine_basis *basis, const supine_state *state,
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
-  float *sigma = malloc(n * sizeof *sigma);
+  float *sigma = malloc(2 * n * sizeof *sigma);
   double along = 0.0;
   if (sigma == NULL) {
     return supine_error_memory(error, "%zu vertices", n);
@@ -72,9 +75,26 @@ supine_status supine_posed_expected(const supine_basis *basis, const supine_stat
     along += state->gravity[i] * from->gravity[i];
   }
   expected->sigma = sigma;
+  expected->another = sigma + n;
+  for (size_t i = 0; i < n; ++i) {
+    expected->another[i] = (float)supine_expected_another_day((double)sigma[i]);
+  }
   supine_posed_expected_measure(n, expected);
   expected->turned = along < 1.0 - 1e-9;
   return SUPINE_OK;
+}
+
+supine_status supine_posed_errors(const supine_basis *basis, const supine_state *state,
+                                  const supine_state *from, supine_errors *errors,
+                                  supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  SUPINE_TRY(supine_posed_expected(basis, state, &scan, &errors->position, error));
+  return supine_posed_expected(basis, state, from, &errors->moved, error);
+}
+
+void supine_posed_errors_free(supine_errors *errors) {
+  supine_posed_expected_free(&errors->position);
+  supine_posed_expected_free(&errors->moved);
 }
 
 void supine_posed_expected_free(supine_expected *expected) {

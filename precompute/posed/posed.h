@@ -20,11 +20,15 @@ supine_status supine_posed_positions(const supine_basis *basis, const supine_pos
 supine_status supine_posed_mesh(const supine_basis *basis, const supine_pose *pose,
                                 supine_mesh *mesh, supine_error *error);
 
-/* Expected errors of the displacements from one state to another. Initialise with zeros, and
- * release with supine_posed_expected_free. */
+/* Expected errors of the displacements from one state to another; from the state of the scan, these
+ * are the errors of positions. Initialise with zeros, and release with supine_posed_expected_free.
+ */
 typedef struct supine_expected {
-  float *sigma;        /* expected error of each vertex's displacement, mm; NULL if unknown */
+  float *sigma; /* expected error of each vertex's displacement, mm; NULL if unknown */
+  /* The same of each vertex's position on another day than that of the scan; NULL if unknown. */
+  float *another;
   double rms, largest; /* RMS and maximum of `sigma` over the vertices, mm */
+  double another_rms;  /* RMS of `another` over the vertices, mm */
   bool turned;         /* whether the displacements include a change of posture */
 } supine_expected;
 
@@ -35,7 +39,20 @@ supine_status supine_posed_expected(const supine_basis *basis, const supine_stat
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error);
 
-/* Set `rms` and `largest` from `sigma` of `count` vertices. */
+/* Expected errors of the positions in a state, and of the displacements to it from another state;
+ * they are equal if the other state is that of the scan. Initialise with zeros, and release with
+ * supine_posed_errors_free. */
+typedef struct supine_errors {
+  supine_expected position, moved;
+} supine_errors;
+
+/* Compute the expected errors of a state. Statuses: as supine_posed_expected. */
+supine_status supine_posed_errors(const supine_basis *basis, const supine_state *state,
+                                  const supine_state *from, supine_errors *errors,
+                                  supine_error *error);
+void supine_posed_errors_free(supine_errors *errors);
+
+/* Set `rms`, `largest` and `another_rms` from the errors of `count` vertices. */
 void supine_posed_expected_measure(size_t count, supine_expected *expected);
 void supine_posed_expected_free(supine_expected *expected);
 

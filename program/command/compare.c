@@ -76,19 +76,22 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
   supine_target row = {.name = in_hilum ? "hilum, subtracted" : "hilum"};
   supine_hilum hilum;
   supine_pose pose[2];
-  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  const supine_state scan = supine_basis_scan(basis);
+  SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
   SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
   for (size_t i = 0; i < 2; ++i) {
     SUPINE_TRY(supine_basis_pose(basis, &item[i]->state, &pose[i], error));
   }
-  SUPINE_TRY(supine_posed_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
+  SUPINE_TRY(supine_posed_errors(basis, &item[1]->state, &item[0]->state, &errors, error));
   if (in_hilum) {
     SUPINE_TRY(
-        supine_options_hilum_expected(basis, &item[1]->state, &item[0]->state, &expected, error));
+        supine_options_hilum_expected(basis, &item[1]->state, &scan, &errors.position, error));
+    SUPINE_TRY(supine_options_hilum_expected(basis, &item[1]->state, &item[0]->state, &errors.moved,
+                                             error));
   }
   SUPINE_TRY(supine_options_targets_find(basis, names,
-                                         (const supine_pose *const[2]){&pose[0], &pose[1]},
-                                         expected.sigma, false, &targets, error));
+                                         (const supine_pose *const[2]){&pose[0], &pose[1]}, &errors,
+                                         false, &targets, error));
   SUPINE_TRY(
       supine_options_hilum(basis, &item[1]->state, &item[0]->state, in_hilum, &hilum, error));
   for (size_t i = 0; i < names->count; ++i) {
@@ -100,7 +103,8 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
   if (supine_length(hilum.move) > 0.0) {
     memcpy(row.move, hilum.move, sizeof row.move);
     row.moved = supine_length(hilum.move);
-    row.expected = hilum.expected;
+    row.moved_error = hilum.expected;
+    row.error = row.another_error = (double)NAN;
     row.volume[0] = row.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
     add_target(item, &row, lists);
   }

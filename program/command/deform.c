@@ -56,7 +56,7 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
-  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
@@ -66,14 +66,16 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
-  SUPINE_TRY(supine_posed_expected(basis, &moved.state, &moved.from.state, &expected, error));
+  SUPINE_TRY(supine_posed_errors(basis, &moved.state, &moved.from.state, &errors, error));
   SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
                                   &moved.hilum, error));
   if (wanted->frame == 1) {
-    SUPINE_TRY(
-        supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &expected, error));
+    const supine_state scan = supine_basis_scan(basis);
+    SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &scan, &errors.position, error));
+    SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &errors.moved,
+                                             error));
   }
-  moved.expected = expected;
+  moved.errors = errors;
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s", moved.from.name,
                  wanted->frame == 1 ? ", in the frame of the hilum" : "", caveats);
@@ -229,9 +231,12 @@ const supine_command supine_command_deform = {
     "deform a basis for a posture and a volume",
     .usage = "BASIS --posture STATE -o FILE\n"
              "BASIS --states LIST",
-    .about = "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
-             "does in each frame, and writes the surface. Each point has its expected error, "
-             "expected_error_mm: " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT,
+    .about =
+        "Deforms the lungs of a basis file to a posture and a volume, as the run-time library "
+        "does in each frame, and writes the surface. Each point has the expected error "
+        "of its position, expected_error_mm; the same on another day than that of the scan, "
+        "another_day_error_mm; and that of its displacement, moved_error_mm, which counts from "
+        "the state of --from. Each is " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT,
     .options = table,
     .notes =
         "Examples:\n"

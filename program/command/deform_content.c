@@ -139,19 +139,23 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_mesh_save_options *frame = &moved->save;
   const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
-  const bool known = moved->expected.sigma != NULL;
+  const bool known = moved->errors.position.sigma != NULL;
   char axes[4];
   char unit_name[24];
   char caveats[SUPINE_CAVEATS_SIZE];
   supine_mesh_unit_name(unit, unit_name);
   supine_mesh_axes_letters(frame->axes, axes);
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
-  (void)fprintf(file,
-                "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: length of "
-                "the displacement%s; %s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
-                moved->from.name, axes, unit_name,
-                known ? "; expected_error_mm: " SUPINE_EXPECTED_MEANING : "", caveats,
-                known ? ",expected_error_mm" : "");
+  (void)fprintf(
+      file,
+      "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: length of "
+      "the displacement%s; %s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
+      moved->from.name, axes, unit_name,
+      known ? "; moved_error_mm: its expected error; expected_error_mm: that of the position "
+              "in the session of the scan; another_day_error_mm: on another day; "
+              "each: " SUPINE_EXPECTED_MEANING
+            : "",
+      caveats, known ? ",moved_error_mm,expected_error_mm,another_day_error_mm" : "");
   for (const supine_target *row = rows; row < rows + count; ++row) {
     double at[3];
     double move[3];
@@ -163,7 +167,7 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
     supine_csv_add(&line, "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", at[0], at[1], at[2], move[0],
                    move[1], move[2], row->moved);
     if (known) {
-      supine_csv_add(&line, "%.3f", row->expected);
+      supine_csv_add(&line, "%.3f,%.3f,%.3f", row->moved_error, row->error, row->another_error);
     }
     supine_csv_end_row(&line);
   }
@@ -178,8 +182,7 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   supine_output output;
   SUPINE_TRY(supine_options_names_open(basis, &names, error));
   const size_t count = each ? supine_basis_get_info(basis)->vertex_count : names.count;
-  SUPINE_TRY(
-      supine_options_targets_find(basis, &names, pose, moved->expected.sigma, each, &rows, error));
+  SUPINE_TRY(supine_options_targets_find(basis, &names, pose, &moved->errors, each, &rows, error));
   SUPINE_TRY(supine_output_open(path, &output, error));
   if (moved->subtract_hilum) {
     for (size_t i = 0; i < count; ++i) {
@@ -457,7 +460,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
   save->normals = mesh.triangle_count > 0 ? normals : NULL;
-  save->scalars[0] = (supine_mesh_scalar){"expected_error_mm", moved->expected.sigma};
+  save->scalars[0] = (supine_mesh_scalar){"expected_error_mm", moved->errors.position.sigma};
+  save->scalars[1] = (supine_mesh_scalar){"moved_error_mm", moved->errors.moved.sigma};
+  save->scalars[2] = (supine_mesh_scalar){"another_day_error_mm", moved->errors.position.another};
   save->lung = lung == NULL ? NULL : lung->data;
   save->fields = fields;
   save->field_count = sizeof fields / sizeof *fields;
@@ -494,10 +499,20 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
       SUPINE_TRY(write_surface(wanted->path, basis, moved, error));
     }
   }
-  if (moved->expected.sigma != NULL) {
-    (void)supine_print(stdout, "expected error %.1f mm (RMS over the points), %.1f mm at most%s\n",
-                       moved->expected.rms, moved->expected.largest,
-                       moved->expected.turned ? "; an extrapolation, as the posture changes" : "");
+  const supine_expected *position = &moved->errors.position;
+  const supine_expected *displacement = &moved->errors.moved;
+  if (position->sigma != NULL) {
+    (void)supine_print(stdout,
+                       "expected error of the positions: same session %.1f mm (RMS over the "
+                       "points), %.1f mm at most; another day %.1f mm%s\n",
+                       position->rms, position->largest, position->another_rms,
+                       position->turned ? "; an extrapolation, as the posture changes" : "");
+    if (moved->from_given) {
+      (void)supine_print(stdout,
+                         "expected error of the displacements: %.1f mm (RMS), %.1f mm at most%s\n",
+                         displacement->rms, displacement->largest,
+                         displacement->turned ? "; an extrapolation, as the posture changes" : "");
+    }
   }
   if (supine_length(moved->hilum.move) > 0.0 && supine_length(moved->hilum.move) < 0.1) {
     (void)puts("the hilum moves by less than 0.1 mm");

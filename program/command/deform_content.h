@@ -46,7 +46,7 @@ typedef struct supine_deformation {
   supine_options_reference_pose from; /* state in the input image, where displacements are 0 */
   bool allow_folds;                   /* whether folded fields cause only a warning */
   bool from_given;                    /* whether --from was given; otherwise `from` is the scan */
-  supine_expected expected;
+  supine_errors errors;               /* of positions, and of displacements from `from` */
   supine_hilum hilum;
   bool subtract_hilum;           /* whether outputs are in the frame of the hilum */
   supine_mesh_save_options save; /* axes, unit and comment of the output */

@@ -117,9 +117,10 @@ static supine_status add_expected(json_t *root, const supine_basis *basis, supin
     status = supine_posed_expected(basis, &state, &scan, &expected, error);
     if (status == SUPINE_OK && expected.largest > 0.0) {
       (void)supine_state_describe(&state, text, sizeof text);
-      (void)json_array_append_new(rows, json_pack("{s:s, s:f, s:f, s:b}", "state", text, "rms_mm",
-                                                  expected.rms, "largest_mm", expected.largest,
-                                                  "extrapolated", (int)expected.turned));
+      (void)json_array_append_new(
+          rows, json_pack("{s:s, s:f, s:f, s:f, s:b}", "state", text, "rms_mm", expected.rms,
+                          "largest_mm", expected.largest, "another_day_mm", expected.another_rms,
+                          "extrapolated", (int)expected.turned));
       (void)supine_expected_parts(basis, &state, &scan, parts, NULL);
       for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
         if (parts[k].rms > 0.0) {

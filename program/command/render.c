@@ -108,14 +108,15 @@ const supine_command supine_command_render = {
     .usage = "BASIS --posture STATE[,STATE...] -o lungs.png [OPTIONS]\n"
              "BASIS --posture STATE,STATE[,STATE...] -o lungs.webp [OPTIONS]\n"
              "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
-    .about = "Draws the lungs in each posture as a translucent shell, on a table and in a faint torso, "
-             "with what is inside. The target that moves most, in multiples of its expected error, "
-             "is orange: a dashed circle shows where it was, an arrow how it moves, and a ring within "
-             "which distance of its ball it is expected (RMS). Other targets are teal; up to eight are "
-             "named. Airways, lobes and other large structures have a colour each. No display is "
-             "needed. In views other than 'lying', and in the look 'displacement', a ball shows the "
-             "body's axes (left, right, anterior, posterior, head, feet) and gravity: an arrow, a dot "
-             "if it points towards you, or a cross if it points away from you.",
+    .about =
+        "Draws the lungs in each posture as a translucent shell, on a table and in a faint torso, "
+        "with what is inside. The target that moves most, in multiples of its expected error, "
+        "is orange: a dashed circle shows where it was, an arrow how it moves, and a ring within "
+        "which distance of its ball it is expected (RMS). Other targets are teal; up to eight are "
+        "named. Airways, lobes and other large structures have a colour each. No display is "
+        "needed. In views other than 'lying', and in the look 'displacement', a ball shows the "
+        "body's axes (left, right, anterior, posterior, head, feet) and gravity: an arrow, a dot "
+        "if it points towards you, or a cross if it points away from you.",
     .options = table,
     .notes = SUPINE_POSTURE_LIST_HELP
     "\n\nExamples:\n"

@@ -109,22 +109,22 @@ static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Compute the expected errors of panel i: of the structures inside the lungs, else of the surface. */
-static supine_status expect(const studio *s, size_t i, supine_expected *expected,
-                            supine_error *error) {
-  return supine_posed_expected(s->inside != NULL ? s->inside : s->basis,
-                               &s->postures.item[i].state, &s->from.state, expected, error);
+/* Compute the expected errors of panel i: of the structures inside the lungs, else of the surface.
+ */
+static supine_status expect(const studio *s, size_t i, supine_errors *errors, supine_error *error) {
+  return supine_posed_errors(s->inside != NULL ? s->inside : s->basis, &s->postures.item[i].state,
+                             &s->from.state, errors, error);
 }
 
 /* Raise the scores of the targets to those of panel i, after fill_panel. */
 static supine_status score_panel(studio *s, size_t i, supine_error *error) {
   const supine_pose *const pose[2] = {&s->from.pose, &s->shown[i].pose};
-  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
+  SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
   SUPINE_FREED_BY(supine_options_targets_free) supine_target *targets = NULL;
   if (s->inside != NULL) {
-    SUPINE_TRY(expect(s, i, &expected, error));
-    SUPINE_TRY(supine_options_targets_find(s->inside, &s->names, pose, expected.sigma, false,
-                                           &targets, error));
+    SUPINE_TRY(expect(s, i, &errors, error));
+    SUPINE_TRY(
+        supine_options_targets_find(s->inside, &s->names, pose, &errors, false, &targets, error));
     supine_options_targets_score(targets, s->names.count, s->score);
   }
   return SUPINE_OK;
@@ -144,13 +144,13 @@ static void tell_target(studio *s, size_t i) {
   }
   (void)supine_print_text(shown->figure, sizeof shown->figure, "%.1f mm", t->moved);
   s->panel[i].figure = shown->figure;
-  if (isnan(t->expected)) {
+  if (isnan(t->moved_error)) {
     (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "error unknown");
   } else {
     (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "\302\261 %.1f expected",
-                            t->expected);
+                            t->moved_error);
   }
-  if (t->moved <= t->expected) {
+  if (t->moved <= t->moved_error) {
     (void)supine_print_text(shown->note, sizeof shown->note, "no change that the model can tell");
   } else {
     (void)supine_options_target_way(t, 2, shown->note);
@@ -162,19 +162,19 @@ static void tell_target(studio *s, size_t i) {
 static supine_status mark_panel(studio *s, size_t i, supine_error *error) {
   drawn *shown = &s->shown[i];
   const supine_pose *const pose[2] = {&s->from.pose, &shown->pose};
-  SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-  SUPINE_TRY(expect(s, i, &expected, error));
+  SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
+  SUPINE_TRY(expect(s, i, &errors, error));
   shown->note[0] = '\0';
   if (s->inside == NULL) {
-    if (expected.sigma != NULL && expected.rms >= 0.05) {
+    if (errors.moved.sigma != NULL && errors.moved.rms >= 0.05) {
       (void)supine_print_text(shown->note, sizeof shown->note, "expected error %.1f mm",
-                              expected.rms);
+                              errors.moved.rms);
     }
     return SUPINE_OK;
   }
   s->panel[i].marks = &shown->marks.marks;
-  SUPINE_TRY(supine_options_marks_make(s->inside, &s->names, pose, expected.sigma, s->score,
-                                       &shown->marks, error));
+  SUPINE_TRY(supine_options_marks_make(s->inside, &s->names, pose, &errors, s->score, &shown->marks,
+                                       error));
   if (shown->marks.selected.name != NULL) {
     tell_target(s, i);
   }
@@ -186,8 +186,8 @@ static void write_legend(studio *s) {
   const size_t unnamed = s->shown[0].marks.unnamed;
   s->legend[0] = '\0';
   if (s->inside != NULL) {
-    supine_text_add(s->legend, sizeof s->legend, "dashed: %s \302\267 ring: within the expected error",
-                    s->from.name);
+    supine_text_add(s->legend, sizeof s->legend,
+                    "dashed: %s \302\267 ring: within the expected error", s->from.name);
   }
   if (s->wanted->view[0] == SUPINE_VIEW_LYING) {
     supine_text_add(s->legend, sizeof s->legend, "%sgravity points down",

@@ -79,6 +79,10 @@ supine_status supine_options_hilum_expected(const supine_basis *basis, const sup
   }
   SUPINE_TRY(prepare(basis, state, from, true, &model, error));
   supine_expected_all(&model, expected->sigma, mean);
+  for (size_t i = 0; i < supine_basis_get_info(basis)->vertex_count; ++i) {
+    const double sigma = (double)expected->sigma[i];
+    expected->another[i] = (float)sqrt(sigma * sigma + supine_expected_day_square(&model, i));
+  }
   supine_posed_expected_measure(supine_basis_get_info(basis)->vertex_count, expected);
   return SUPINE_OK;
 }

@@ -112,14 +112,25 @@ supine_status supine_options_inside_open(const supine_basis *lungs, const char *
   return SUPINE_OK;
 }
 
+/* Return the RMS of the values of the vertices order[begin] to order[end - 1]; NAN if there are no
+ * values. */
+static double rms_of(const supine_options_names *names, size_t begin, size_t end,
+                     const float *values) {
+  double square = values == NULL ? (double)NAN : 0;
+  for (size_t i = begin; i < end && values != NULL; ++i) {
+    const double value = (double)values[names->order[i]];
+    square += value * value / (double)(end - begin);
+  }
+  return sqrt(square);
+}
+
 /* Average the vertices order[begin] to order[end - 1] to a target; [N, 3] positions before and
  * after.
  */
 static supine_target average(const supine_options_names *names, size_t begin, size_t end,
-                             const float *after, const float *before, const float *sigma) {
+                             const float *after, const float *before, const supine_errors *errors) {
   const double count = (double)(end - begin);
   supine_target target = {.name = names->text[names->part[names->order[begin]]]};
-  double square = 0;
   for (size_t i = begin; i < end; ++i) {
     const size_t vertex = names->order[i];
     for (size_t k = 0; k < 3; ++k) {
@@ -127,10 +138,11 @@ static supine_target average(const supine_options_names *names, size_t begin, si
       target.at[k] += x / count;
       target.move[k] += (x - (double)before[3 * vertex + k]) / count;
     }
-    square += sigma == NULL ? (double)NAN : (double)sigma[vertex] * (double)sigma[vertex] / count;
   }
   target.moved = supine_length(target.move);
-  target.expected = sqrt(square);
+  target.error = rms_of(names, begin, end, errors->position.sigma);
+  target.another_error = rms_of(names, begin, end, errors->position.another);
+  target.moved_error = rms_of(names, begin, end, errors->moved.sigma);
   target.anatomy = names->anatomy[names->part[names->order[begin]]] != 0;
   return target;
 }
@@ -166,8 +178,9 @@ static void find_volumes(const supine_basis_info *info, const supine_options_nam
 
 supine_status supine_options_targets_find(const supine_basis *inside,
                                           const supine_options_names *names,
-                                          const supine_pose *const pose[2], const float *sigma,
-                                          bool each, supine_target **targets, supine_error *error) {
+                                          const supine_pose *const pose[2],
+                                          const supine_errors *errors, bool each,
+                                          supine_target **targets, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   const size_t count = each ? n : names->count;
@@ -184,7 +197,7 @@ supine_status supine_options_targets_find(const supine_basis *inside,
     const size_t begin = each ? i : names->begin[i];
     const size_t end = each ? i + 1 : names->begin[i + 1];
     if (end > begin) {
-      (*targets)[i] = average(names, begin, end, after, before, sigma);
+      (*targets)[i] = average(names, begin, end, after, before, errors);
       (*targets)[i].lung = supine_options_lung_of(info, names->order[begin]);
     } else { /* a name may have no vertices */
       (*targets)[i].name = names->text[i];
@@ -204,9 +217,9 @@ void supine_options_targets_free(supine_target **targets) {
 const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]) {
   static const char *const names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
   double left[3] = {fabs(target->move[0]), fabs(target->move[1]), fabs(target->move[2])};
-  if (target->moved <= target->expected) {
+  if (target->moved <= target->moved_error) {
     (void)supine_print_text(way, 96, "%.1f mm, within its error of %.1f", target->moved,
-                            target->expected);
+                            target->moved_error);
   } else {
     way[0] = '\0';
     for (size_t i = 0; i < most; ++i) {
@@ -232,9 +245,18 @@ void supine_options_target_shift(supine_target *target, const double shift[3]) {
 
 json_t *supine_options_target_json(const supine_target *t) {
   static const char *const keys[] = {"volume_before_ml", "volume_after_ml"};
-  json_t *target = json_pack("{s:s, s:[f, f, f], s:f, s:o}", "name", t->name, "move", t->move[0],
-                             t->move[1], t->move[2], "mm", t->moved, "expected_error_mm",
-                             isnan(t->expected) ? json_null() : json_real(t->expected));
+  const struct {
+    const char *key;
+    double value;
+  } errors[] = {{"moved_error_mm", t->moved_error},
+                {"expected_error_mm", t->error},
+                {"another_day_error_mm", t->another_error}};
+  json_t *target = json_pack("{s:s, s:[f, f, f], s:f}", "name", t->name, "move", t->move[0],
+                             t->move[1], t->move[2], "mm", t->moved);
+  for (size_t i = 0; i < sizeof errors / sizeof *errors; ++i) {
+    (void)json_object_set_new(target, errors[i].key,
+                              isnan(errors[i].value) ? json_null() : json_real(errors[i].value));
+  }
   for (size_t i = 0; i < 2; ++i) {
     if (t->volume[0] != 0.0) {
       (void)json_object_set_new(target, keys[i],
@@ -249,8 +271,8 @@ size_t supine_options_targets_first(const supine_target *targets, size_t count) 
   for (size_t i = 1; i < count; ++i) {
     const supine_target *a = &targets[first];
     const supine_target *b = &targets[i];
-    const bool known = a->expected > 0.0 && b->expected > 0.0;
-    const bool farther = known ? b->moved * a->expected > a->moved * b->expected
+    const bool known = a->moved_error > 0.0 && b->moved_error > 0.0;
+    const bool farther = known ? b->moved * a->moved_error > a->moved * b->moved_error
                                : b->moved > a->moved; /* expected errors may be unknown */
     if (a->anatomy != b->anatomy ? a->anatomy : farther) {
       first = i;
@@ -262,7 +284,7 @@ size_t supine_options_targets_first(const supine_target *targets, size_t count) 
 void supine_options_targets_score(const supine_target *targets, size_t count, double *score) {
   for (size_t i = 0; i < count; ++i) {
     const supine_target *t = &targets[i];
-    const double own = t->expected > 0.0 ? t->moved / t->expected : t->moved;
+    const double own = t->moved_error > 0.0 ? t->moved / t->moved_error : t->moved;
     score[i] = t->anatomy ? -1.0 : fmax(score[i], own);
   }
 }
@@ -294,15 +316,16 @@ static void add_label(const appearance *look, const supine_target *t, supine_opt
   }
   (void)supine_print_text(marks->label[look->part], sizeof marks->label[look->part], "%s",
                           supine_text_shorten(t->name, sizeof label, label));
-  if (t->moved > t->expected && look->kind == SUPINE_MARK_TARGET) {
+  if (t->moved > t->moved_error && look->kind == SUPINE_MARK_TARGET) {
     /* A mark from left to right keeps the number behind a name in Arabic or Hebrew. */
     supine_text_add(marks->label[look->part], sizeof marks->label[look->part], "%s %.1f mm",
                     supine_render_shapes_text() ? "\342\200\216" : "", t->moved);
   }
   middle->label = marks->label[look->part];
   middle->kind = look->kind;
-  middle->moved = t->moved > t->expected || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
-  middle->expected = t->expected > 0.0 && t->moved >= 0.05 ? (float)t->expected : 0.0F;
+  middle->moved =
+      t->moved > t->moved_error || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
+  middle->expected = t->error > 0.0 && t->moved >= 0.05 ? (float)t->error : 0.0F;
 }
 
 /* Make the marks of a structure: of its vertices, and of its middle, which has the label. */
@@ -360,9 +383,9 @@ static void show_structures(const supine_options_names *names, const supine_targ
 
 supine_status supine_options_marks_make(const supine_basis *inside,
                                         const supine_options_names *names,
-                                        const supine_pose *const pose[2], const float *sigma,
-                                        const double *score, supine_options_marks *marks,
-                                        supine_error *error) {
+                                        const supine_pose *const pose[2],
+                                        const supine_errors *errors, const double *score,
+                                        supine_options_marks *marks, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   const size_t n = info->vertex_count;
   SUPINE_ARENA arena = {0};
@@ -375,7 +398,7 @@ supine_status supine_options_marks_make(const supine_basis *inside,
   if (arena.failed || marks->arena.failed) {
     return supine_error_memory(error, "%zu points", n);
   }
-  SUPINE_TRY(supine_options_targets_find(inside, names, pose, sigma, false, &targets, error));
+  SUPINE_TRY(supine_options_targets_find(inside, names, pose, errors, false, &targets, error));
   (void)supine_deform(inside, pose[1], xyz);
   marks->marks = (supine_marks){n, marks->mark, info->triangle_count, info->triangles};
   (void)supine_deform(inside, pose[0], before);

@@ -7,6 +7,8 @@
 
 #include "base/arena.h"
 
+#include "precompute/posed/posed.h"
+
 #include "program/view/render/render.h"
 
 typedef struct supine_options_names {
@@ -43,17 +45,20 @@ typedef struct supine_target {
   double moved;     /* length of `move`, mm */
   double volume[2]; /* volume before and after, mL; NAN if it is no closed mesh; 0 without meshes */
   bool anatomy;     /* whether it is anatomy, such as airways or a lobe, and no target */
-  double expected;  /* RMS of the vertices' expected errors, mm; NAN if unknown */
+  /* RMS of the vertices' expected errors, mm; NAN if unknown: of the position, in the session of
+   * the scan and on another day; and of the displacement. */
+  double error, another_error, moved_error;
 } supine_target;
 
 /* Compute where the structures are in pose[1], and how they have moved from pose[0].
- * @param sigma    [N] expected error of each vertex, mm; NULL if unknown
+ * @param errors   of the positions in pose[1], and of the displacements
  * @param each     true for a target for each vertex, false for one for each structure
  * @param targets  output: array of targets in the order of `names`, which the caller frees */
 supine_status supine_options_targets_find(const supine_basis *inside,
                                           const supine_options_names *names,
-                                          const supine_pose *const pose[2], const float *sigma,
-                                          bool each, supine_target **targets, supine_error *error);
+                                          const supine_pose *const pose[2],
+                                          const supine_errors *errors, bool each,
+                                          supine_target **targets, supine_error *error);
 
 /* Return the index of the target to tell of first: that with the largest displacement, in multiples
  * of its expected error. Targets come before anatomy. */
@@ -63,15 +68,16 @@ size_t supine_options_targets_first(const supine_target *targets, size_t count);
 void supine_options_targets_free(supine_target **targets);
 
 /* Write the direction of a target's displacement in words, with at most `most` parts and the
- * largest first: "12 to the feet, 7 to the front". For a displacement below its expected error,
- * write "0.7 mm, within its error of 3.6". Return `way`. */
+ * largest first: "12 to the feet, 7 to the front". For a displacement below its own error, write
+ * "0.7 mm, within its error of 3.6". Return `way`. */
 const char *supine_options_target_way(const supine_target *target, size_t most, char way[96]);
 
 /* Subtract a displacement, mm, such as that of the hilum, from a target's position and
  * displacement. */
 void supine_options_target_shift(supine_target *target, const double shift[3]);
 
-/* Return a target as JSON: its name, displacement, and the expected error. */
+/* Return a target as JSON: its name, displacement, and the expected errors of its position and of
+ * the displacement. */
 json_t *supine_options_target_json(const supine_target *target);
 
 enum { SUPINE_LABELS_MAX = 8 }; /* largest number of targets that a picture names */
@@ -93,13 +99,13 @@ typedef struct supine_options_marks {
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
  * Those that `marks` held before are freed. Names of up to SUPINE_LABELS_MAX targets are written.
- * @param sigma  [N] expected error of each vertex, mm; NULL if unknown
+ * @param errors  as supine_options_targets_find
  * @param score  [names->count] of supine_options_targets_score */
 supine_status supine_options_marks_make(const supine_basis *inside,
                                         const supine_options_names *names,
-                                        const supine_pose *const pose[2], const float *sigma,
-                                        const double *score, supine_options_marks *marks,
-                                        supine_error *error);
+                                        const supine_pose *const pose[2],
+                                        const supine_errors *errors, const double *score,
+                                        supine_options_marks *marks, supine_error *error);
 void supine_options_marks_free(supine_options_marks *marks);
 
 #endif

@@ -133,7 +133,7 @@ static const struct {
               {NULL, "error_in_fuller_scan", "error in the fuller / in the emptier scan"},
               {NULL, "error_modes", "error by number of modes, share"},
               {NULL, "expected_constant_mm", "expected error^2 / displacement, mm"},
-              {NULL, "expected_error", "expected error of a displacement from the scan"},
+              {NULL, "expected_error", "expected error of a position"},
               {NULL, "expected_error_terms", "terms of the expected error"},
               {NULL, "expected_largest_mm", "expected error, largest, mm"},
               {NULL, "expected_rms_mm", "expected error, RMS, mm"},

@@ -100,14 +100,17 @@ static supine_status find_errors(supine_comparison *c, supine_error *error) {
     supine_compared_posture *posture = &c->posture[i];
     const supine_state *state = &posture->item->state;
     const supine_pose *const pose[2] = {&c->reference.pose, &posture->pose};
-    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected surface = {0};
-    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected inside = {0};
-    SUPINE_TRY(supine_posed_expected(c->basis, state, &c->reference.state, &surface, error));
-    posture->expected_error = surface.rms;
-    c->has_errors = c->has_errors || surface.rms > 0.0;
+    const supine_state *from = &c->reference.state;
+    SUPINE_FREED_BY(supine_posed_errors_free) supine_errors surface = {.moved = {0}};
+    SUPINE_FREED_BY(supine_posed_errors_free) supine_errors inside = {.moved = {0}};
+    SUPINE_TRY(supine_posed_errors(c->basis, state, from, &surface, error));
+    posture->expected_error = surface.position.rms;
+    posture->another_error = surface.position.another_rms;
+    posture->moved_error = surface.moved.rms;
+    c->has_errors = c->has_errors || surface.position.rms > 0.0;
     if (c->inside != NULL) {
-      SUPINE_TRY(supine_posed_expected(c->inside, state, &c->reference.state, &inside, error));
-      SUPINE_TRY(supine_options_targets_find(c->inside, &c->names, pose, inside.sigma, false,
+      SUPINE_TRY(supine_posed_errors(c->inside, state, from, &inside, error));
+      SUPINE_TRY(supine_options_targets_find(c->inside, &c->names, pose, &inside, false,
                                              &posture->targets, error));
     }
   }

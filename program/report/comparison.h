@@ -26,9 +26,11 @@ typedef struct supine_compared_posture {
   const char *label;               /* name for texts, such as "left side" */
   supine_pose pose;
   supine_distance_statistics displacement; /* displacement from the reference pose, mm */
-  double expected_error;                   /* expected RMS error, mm; 0 if unknown */
-  supine_hilum hilum;                      /* from the reference pose */
-  supine_target *targets;                  /* [names.count] structures inside the lungs, or NULL */
+  /* Expected RMS errors over the surface, mm; 0 if unknown: of positions, in the session of the
+   * scan and on another day, and of displacements. */
+  double expected_error, another_error, moved_error;
+  supine_hilum hilum;     /* from the reference pose */
+  supine_target *targets; /* [names.count] structures inside the lungs, or NULL */
   bool has_breath; /* whether the lungs can hold the breath; if not, the members from `gain` on are
                       0 */
   double volume[SUPINE_LUNGS_MAX];           /* volume of each lung, gas and tissue, mL */

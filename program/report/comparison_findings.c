@@ -48,34 +48,25 @@ static double lowest_over_uppermost(const supine_comparison *c, size_t posture) 
   return gain[1] / volume[1] / (gain[0] / volume[0]);
 }
 
-/* Return the index of the target that the sentences are about: that with the largest displacement
- * in any posture, in multiples of its expected error. */
-static size_t find_first(const supine_comparison *c) {
-  size_t first = 0;
-  double most = -1.0;
-  if (c->inside == NULL) {
-    return 0;
+/* Return the target of which a posture's headline tells: that which moves farthest in multiples of
+ * its error. Return NULL if there is none, as anatomy is not a target. */
+static const supine_target *find_first(const supine_comparison *c,
+                                       const supine_compared_posture *p) {
+  if (p->targets == NULL) {
+    return NULL;
   }
-  for (size_t i = 0; i < c->postures.count; ++i) {
-    const size_t k = supine_options_targets_first(c->posture[i].targets, c->names.count);
-    const supine_target *t = &c->posture[i].targets[k];
-    const double ratio = t->expected > 0.0 ? t->moved / t->expected : t->moved;
-    if (!supine_report_is_reference(c, i) && ratio > most) {
-      most = ratio;
-      first = k;
-    }
-  }
-  return first;
+  const supine_target *first =
+      &p->targets[supine_options_targets_first(p->targets, c->names.count)];
+  return first->anatomy ? NULL : first;
 }
 
-/* Return a sentence on a posture: how far target `first` or, without targets, the surface moves.
- * Anatomy is not a target. */
-static json_t *finding(const supine_comparison *c, size_t posture, size_t first) {
+/* Return a sentence on a posture: how far its first target or, without targets, the surface moves.
+ */
+static json_t *finding(const supine_comparison *c, size_t posture) {
   const supine_compared_posture *p = &c->posture[posture];
-  const supine_target *t =
-      p->targets != NULL && !p->targets[first].anatomy ? &p->targets[first] : NULL;
+  const supine_target *t = find_first(c, p);
   const double moved = t != NULL ? t->moved : p->displacement.mean;
-  const double error = t != NULL ? t->expected : p->expected_error;
+  const double error = t != NULL ? t->moved_error : p->moved_error;
   const char *name = p->item->name;
   char way[96];
   char text[512] = "";
@@ -105,12 +96,10 @@ static json_t *finding(const supine_comparison *c, size_t posture, size_t first)
 }
 
 json_t *supine_report_findings(const supine_comparison *c) {
-  enum { SENTENCES = 3 };
   json_t *list = json_array();
-  const size_t first = find_first(c);
-  for (size_t i = 0; i < c->postures.count && json_array_size(list) < SENTENCES; ++i) {
+  for (size_t i = 0; i < c->postures.count; ++i) {
     if (!supine_report_is_reference(c, i)) {
-      (void)json_array_append_new(list, finding(c, i, first));
+      (void)json_array_append_new(list, finding(c, i));
     }
   }
   return list;
@@ -173,14 +162,17 @@ json_t *supine_report_postures(const supine_comparison *c) {
     const supine_compared_posture *p = &c->posture[i];
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
     (void)json_array_append_new(
-        list,
-        json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label, "line",
-                  supine_report_line(i), "held", make_lungs(c, i), "mean",
-                  json_sprintf("%.1f", p->displacement.mean), "max",
-                  json_sprintf("%.1f", p->displacement.max), "error",
-                  p->expected_error > 0 ? json_sprintf("%.1f", p->expected_error) : json_string(""),
-                  "ratio_mark", mark_of(c, i, "ratio"), "ratio",
-                  isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio)));
+        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label,
+                        "line", supine_report_line(i), "held", make_lungs(c, i), "mean",
+                        json_sprintf("%.1f", p->displacement.mean), "max",
+                        json_sprintf("%.1f", p->displacement.max), "error",
+                        p->moved_error > 0 ? json_sprintf("%.1f", p->moved_error) : json_string(""),
+                        "place",
+                        c->has_errors ? json_sprintf("%.1f", p->expected_error) : json_string(""),
+                        "another",
+                        c->has_errors ? json_sprintf("%.1f", p->another_error) : json_string(""),
+                        "ratio_mark", mark_of(c, i, "ratio"), "ratio",
+                        isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio)));
   }
   return list;
 }

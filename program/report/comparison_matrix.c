@@ -11,12 +11,12 @@ enum { POSTURES_MAX = 4 }; /* columns of a table, besides the names */
 /* Return the cell of a target: its displacement and error, and its directions below. */
 static json_t *target_cell(const supine_target *t) {
   SUPINE_C_LOCALE;
-  const bool told = isnan(t->expected) || t->moved > t->expected;
+  const bool told = isnan(t->moved_error) || t->moved > t->moved_error;
   char way[96];
-  json_t *size = isnan(t->expected) ? json_sprintf("%.1f", t->moved)
-                                    : json_sprintf("%.1f \u00b1 %.1f", t->moved, t->expected);
+  json_t *size = isnan(t->moved_error) ? json_sprintf("%.1f", t->moved)
+                                       : json_sprintf("%.1f \u00b1 %.1f", t->moved, t->moved_error);
   json_t *words = told ? json_string(supine_options_target_way(t, 2, way))
-                       : json_sprintf("within its error of %.1f", t->expected);
+                       : json_sprintf("within its error of %.1f", t->moved_error);
   return json_pack("{s:o, s:o, s:b}", "size", size, "words", words, "untold", (int)!told);
 }
 

@@ -64,16 +64,19 @@ static json_t *encode_targets(const supine_comparison *c, const supine_compared_
 
 static json_t *encode_posture(const supine_comparison *c, size_t i) {
   const supine_compared_posture *p = &c->posture[i];
-  return json_pack(
-      "{s:s, s:o, s:o, s:o, s:o*, s:o*, s:o, s:o*, s:o*, s:o*, s:o*}", "name", p->item->name,
-      "gravity", supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
-      statistics(&p->displacement), "hilum_mm", supine_options_json_numbers(3, p->hilum.move),
-      "hilum_error_mm", isnan(p->hilum.expected) ? NULL : json_real(p->hilum.expected),
-      "expected_error_mm", c->has_errors ? json_real(p->expected_error) : NULL, "volume_ml",
-      volumes(c, i, false), "gain_ml", p->has_breath ? by_lung(c, p->gain) : NULL, "slabs",
-      p->has_breath ? encode_slabs(p) : NULL, "targets",
-      c->inside != NULL ? encode_targets(c, p, false) : NULL, "anatomy",
-      c->inside != NULL ? encode_targets(c, p, true) : NULL);
+  return json_pack("{s:s, s:o, s:o, s:o, s:o*, s:o*, s:o*, s:o*, s:o, s:o*, s:o*, s:o*, s:o*}",
+                   "name", p->item->name, "gravity",
+                   supine_options_json_numbers(3, p->item->state.gravity), "displacement_mm",
+                   statistics(&p->displacement), "hilum_mm",
+                   supine_options_json_numbers(3, p->hilum.move), "hilum_error_mm",
+                   isnan(p->hilum.expected) ? NULL : json_real(p->hilum.expected), "moved_error_mm",
+                   c->has_errors ? json_real(p->moved_error) : NULL, "expected_error_mm",
+                   c->has_errors ? json_real(p->expected_error) : NULL, "another_day_error_mm",
+                   c->has_errors ? json_real(p->another_error) : NULL, "volume_ml",
+                   volumes(c, i, false), "gain_ml", p->has_breath ? by_lung(c, p->gain) : NULL,
+                   "slabs", p->has_breath ? encode_slabs(p) : NULL, "targets",
+                   c->inside != NULL ? encode_targets(c, p, false) : NULL, "anatomy",
+                   c->inside != NULL ? encode_targets(c, p, true) : NULL);
 }
 
 /* Append a row to the table named `heading`: `value` in the column `name`, then `columns`,
@@ -97,12 +100,14 @@ static void add_tables(const supine_comparison *c, json_t *text) {
     const supine_compared_posture *p = &c->posture[i];
     json_t *moved = statistics(&p->displacement);
     if (c->has_errors) {
-      (void)json_object_set_new(moved, "expected error", json_real(p->expected_error));
+      (void)json_object_set_new(moved, "its error", json_real(p->moved_error));
+      (void)json_object_set_new(moved, "error of positions", json_real(p->expected_error));
+      (void)json_object_set_new(moved, "on another day", json_real(p->another_error));
     }
     (void)json_object_set_new(moved, "hilum x, y, z",
                               supine_options_json_numbers(3, p->hilum.move));
     if (!isnan(p->hilum.expected)) {
-      (void)json_object_set_new(moved, "its error", json_real(p->hilum.expected));
+      (void)json_object_set_new(moved, "error of the hilum", json_real(p->hilum.expected));
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
     if (c->inside != NULL) {

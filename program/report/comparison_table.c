@@ -8,17 +8,24 @@
 #include "program/report/comparison.h"
 
 static const char header[] = "schema,from,posture,gx,gy,gz,kind,name,mm,dx,dy,dz,max_mm,"
-                             "expected_error_mm,volume_before_ml,volume_ml\n";
+                             "moved_error_mm,expected_error_mm,another_day_error_mm,"
+                             "volume_before_ml,volume_ml\n";
 
 /* A row of the table. Numbers that it lacks are NAN, which become empty fields. */
 typedef struct row {
   const char *kind;
   const char *name;
-  double mm, move[3], max, error, before, volume;
+  double mm, move[3], max, moved_error, error, another_error, before, volume;
 } row;
 
-static const row none = {
-    .mm = NAN, .move = {NAN, NAN, NAN}, .max = NAN, .error = NAN, .before = NAN, .volume = NAN};
+static const row none = {.mm = NAN,
+                         .move = {NAN, NAN, NAN},
+                         .max = NAN,
+                         .moved_error = NAN,
+                         .error = NAN,
+                         .another_error = NAN,
+                         .before = NAN,
+                         .volume = NAN};
 
 static void add_number(supine_csv_row *line, double value) {
   if (isnan(value)) {
@@ -30,8 +37,9 @@ static void add_number(supine_csv_row *line, double value) {
 
 static void add_row(const supine_comparison *c, size_t posture, const row *of, FILE *file) {
   const supine_posture_item *item = c->posture[posture].item;
-  const double numbers[] = {of->mm,  of->move[0], of->move[1], of->move[2],
-                            of->max, of->error,   of->before,  of->volume};
+  const double numbers[] = {of->mm,     of->move[0],     of->move[1], of->move[2],
+                            of->max,    of->moved_error, of->error,   of->another_error,
+                            of->before, of->volume};
   supine_csv_row line = {.file = file};
   supine_csv_add(&line, "%d", SUPINE_COMPARISON_SCHEMA);
   supine_csv_add_text(&line, c->reference.name);
@@ -56,7 +64,11 @@ static void add_lungs(const supine_comparison *c, size_t posture, FILE *file) {
   surface.name = "";
   surface.mm = p->displacement.mean;
   surface.max = p->displacement.max;
-  surface.error = c->has_errors ? p->expected_error : (double)NAN;
+  if (c->has_errors) {
+    surface.moved_error = p->moved_error;
+    surface.error = p->expected_error;
+    surface.another_error = p->another_error;
+  }
   add_row(c, posture, &surface, file);
   if (supine_length(p->hilum.move) > 0.0) { /* else the basis does not say how the hilum moves */
     row hilum = none;
@@ -64,7 +76,7 @@ static void add_lungs(const supine_comparison *c, size_t posture, FILE *file) {
     hilum.name = "";
     hilum.mm = supine_length(p->hilum.move);
     memcpy(hilum.move, p->hilum.move, sizeof hilum.move);
-    hilum.error = p->hilum.expected;
+    hilum.moved_error = p->hilum.expected;
     add_row(c, posture, &hilum, file);
   }
   if (info->is_fields) { /* they have no volumes */
@@ -90,7 +102,9 @@ static void add_targets(const supine_comparison *c, size_t posture, FILE *file) 
     of.name = t->name;
     of.mm = t->moved;
     memcpy(of.move, t->move, sizeof of.move);
-    of.error = t->expected;
+    of.moved_error = t->moved_error;
+    of.error = t->error;
+    of.another_error = t->another_error;
     of.before = t->volume[0] != 0.0 ? t->volume[0] : (double)NAN;
     of.volume = t->volume[0] != 0.0 ? t->volume[1] : (double)NAN;
     add_row(c, posture, &of, file);

@@ -12,8 +12,9 @@ export interface Tensor {
 }
 
 /** A named structure: the mean position `at` of its vertices, its displacement `move`, the length `mm` of this
- * displacement, and its expected error (3-D RMS). Lengths are in mm. `anatomy` is true for a large part, such as
- * airways, vessels or a lobe, of which these are means, and false for a target. */
+ * displacement, and expected errors (3-D RMS): of the position in the session of the scan (`expectedError`) and on another
+ * day (`anotherDayError`), and of the displacement (`movedError`). Lengths are in mm. `anatomy` is true for a large part,
+ * such as airways, vessels or a lobe, of which these are means, and false for a target. */
 export interface Target {
   name: string;
   lung: string;
@@ -21,6 +22,8 @@ export interface Target {
   move: number[];
   mm: number;
   expectedError: number;
+  anotherDayError: number;
+  movedError: number;
   anatomy: boolean;
 }
 
@@ -86,10 +89,12 @@ export interface Basis {
   /** Compute `positions` and `normals` of the pose and return `positions`. Normals are weighted sums of the file's
    * vectors for normals or, if it has none, are computed from the triangles. */
   deformLit(): Float32Array;
-  /** Compute the expected position error [N] of the vertices in the pose, mm (3-D RMS), if the positions in state
-   * `since`, or in the scan, are exact. The next call overwrites the result.
+  /** Compute the expected error [N] of the vertices in the pose, mm (3-D RMS): of their positions in the session of the
+   * scan, or of their displacements from the state `since`. The next call overwrites the result.
    * @throws SupineError */
   expectedError(since?: State): Float32Array;
+  /** Return the expected error of a position on another day than that of the scan, mm, from that in its session. */
+  anotherDay(sameSession: number): number;
   /** Compute where each named structure of a basis made by 'supine embed' is in the pose, and how far it has moved from
    * the state `since`, or from the scan. `positions` are then those of the pose.
    * @throws SupineError */

@@ -72,10 +72,10 @@ function number(value, name) {
 }
 
 /** Divide the sums of a target by the number of its vertices. */
-function meanOf({ count, at, move, expectedError, ...target }) {
+function meanOf({ count, at, move, ...target }) {
   const mean = move.map((x) => x / count);
-  const error = Math.sqrt(expectedError / count);
-  return { ...target, at: at.map((x) => x / count), move: mean, mm: Math.hypot(...mean), expectedError: error };
+  const [expectedError, movedError] = [target.expectedError, target.movedError].map((sum) => Math.sqrt(sum / count));
+  return { ...target, at: at.map((x) => x / count), move: mean, mm: Math.hypot(...mean), expectedError, movedError };
 }
 
 class Basis {
@@ -305,6 +305,10 @@ class Basis {
     return this.#view(Float32Array, this.#expected, this.vertexCount);
   }
 
+  anotherDay(sameSession) {
+    return this.#c.supine_expected_another_day(sameSession);
+  }
+
   /** Return expectedError(since), or NaN for each vertex of another simulator's fields, whose error is unknown. */
   #expectedOrUnknown(since) {
     try {
@@ -317,7 +321,8 @@ class Basis {
 
   targets(since) {
     const after = this.deform().slice();
-    const sigma = this.#expectedOrUnknown(since);
+    const sigma = this.#expectedOrUnknown().slice();
+    const moved = this.#expectedOrUnknown(since);
     this.#check(
       since === undefined
         ? this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error)
@@ -333,16 +338,18 @@ class Basis {
         target.move[k] += after[3 * v + k] - this.positions[3 * v + k];
       }
       target.expectedError += sigma[v] ** 2;
+      target.movedError += moved[v] ** 2;
     });
     this.deform();
-    return made.filter(({ count }) => count > 0).map(meanOf);
+    return made.filter(({ count }) => count > 0).map(meanOf)
+      .map((target) => ({ ...target, anotherDayError: this.anotherDay(target.expectedError) }));
   }
 
   /** Return a target for each name of the file, with sums that are still 0. */
   #emptyTargets() {
     const names = new TextDecoder().decode(this.tensor('names')?.data ?? new Uint8Array()).split('\n');
     const anatomy = this.tensor('anatomy')?.data ?? [];
-    const sums = () => ({ at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, count: 0 });
+    const sums = () => ({ at: [0, 0, 0], move: [0, 0, 0], mm: 0, expectedError: 0, movedError: 0, count: 0 });
     return names.map((name, i) => ({ name, anatomy: anatomy[i] === 1, lung: '', ...sums() }));
   }
 

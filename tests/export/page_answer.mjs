@@ -30,7 +30,7 @@ const json = JSON.parse(
 );
 const [rest] = json.postures;
 const cards = await page.evaluate(() => [...document.querySelectorAll('#postures small')].map((e) => e.textContent));
-json.postures.forEach(({ name, displacement_mm: mm, expected_error_mm: error }, i) => {
+json.postures.forEach(({ name, displacement_mm: mm, moved_error_mm: error }, i) => {
   if (i === 0) return assert.equal(cards[0], 'reference');
   const [, mean, words] = /^([\d.]+) mm(, error [\d.]+| on average)$/.exec(cards[i]);
   assert.equal(words, mm.mean > error ? ' on average' : `, error ${error.toFixed(1)}`, name);
@@ -38,7 +38,7 @@ json.postures.forEach(({ name, displacement_mm: mm, expected_error_mm: error }, 
 });
 const surface = (await page.locator('#surface-text').textContent()).match(/[\d.]+\d/g).map(Number);
 const { mean, p95, max } = json.postures[2].displacement_mm;
-[mean, 95, p95, max, json.postures[2].expected_error_mm].forEach((x, i) =>
+[mean, 95, p95, max, json.postures[2].moved_error_mm].forEach((x, i) =>
   assert.ok(Math.abs(surface[i] - x) < 0.06, `${surface}`),
 );
 const bars = await page.evaluate(() =>

@@ -42,14 +42,14 @@ function told(posture, from) {
     pair: pair.mm,
     nodule: column('moved_mm'),
     move: ['dx', 'dy', 'dz'].map(column),
-    sigma: column('expected_error_mm'),
+    sigma: column('moved_error_mm'),
     mean: report.postures[0].displacement_mm.mean,
     max: report.postures[0].displacement_mm.max,
     largest: Number(largest[1]),
     name: largest[2],
     reported: report.displacement_from,
     held: report.postures[0].volume_ml,
-    error: report.postures[0].expected_error_mm,
+    error: report.postures[0].moved_error_mm,
   };
 }
 

@@ -180,8 +180,8 @@ for (const [since, from] of [
     targets.filter(({ anatomy }) => anatomy).map(({ name }) => name),
     ['lungs'],
   ); // a mesh as large as the lungs
-  targets.forEach(({ at, move, mm, expectedError }, i) =>
-    [...at, ...move, mm, expectedError].forEach((x, k) =>
+  targets.forEach(({ at, move, mm, movedError, expectedError, anotherDayError }, i) =>
+    [...at, ...move, mm, movedError, expectedError, anotherDayError].forEach((x, k) =>
       assert.ok(Math.abs(x - rows[i][2 + k]) < 5e-3, `${rows[i]}: ${x}`),
     ),
   );

@@ -339,7 +339,7 @@ with open(table) as file:
     rows = [line.split(",") for line in file.read().split("\n")[2:-1]]
 assert len(rows) == len(wanted) == 2 and all(t.mm > 0 and not t.anatomy for t in wanted)
 for row, t in zip(rows, wanted):
-    assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float), [*t.at, *t.move, t.mm, t.expected_error], atol=2e-3), (row, t)
+    assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float), [*t.at, *t.move, t.mm, t.moved_error, t.expected_error, t.another_day_error], atol=2e-3), (row, t)
 refused(supine.ArgumentError, "no structures", lungs.targets, "left")
 assert supine.embed(made, place).vertex_count == 1
 parts = supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place]))

@@ -48,32 +48,36 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at };
 }
 
-/** Return the RMS over the surface of the expected error of the displacement between two moments, mm; null if it is
- * unknown, as in another simulator's fields. */
-function surfaceError({ library, metadata }, now, from) {
-  if (!metadata.expected_error_mm) return null;
-  const sigma = pose(library, now).expectedError(from.state);
-  return Math.sqrt(sigma.reduce((sum, x) => sum + x * x, 0) / sigma.length);
+/** Return RMS expected errors over the surface, mm, as targetsBetween; null if they are unknown, as in another
+ * simulator's fields. */
+function surfaceErrors({ library, metadata }, now, from) {
+  if (!metadata.expected_error_mm) return { error: null, session: null, place: null };
+  const rms = (sigma) => Math.sqrt(sigma.reduce((sum, x) => sum + x * x, 0) / sigma.length);
+  const error = rms(pose(library, now).expectedError(from.state));
+  const session = rms(library.expectedError());
+  return { error, session, place: library.anotherDay(session) };
 }
 
-/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, the expected
- * error of the surface, mm, or null, and the result of targetsBetween. */
+/** Return how the lungs move from the state `from` to the state `now`: the statistics of distancesOf, expected errors
+ * of the surface, mm, or null, and the result of targetsBetween. */
 function movedBetween(basis, now, from) {
   const distances = distancesOf(basis, placesOf(basis, now), placesOf(basis, from));
   const targets = basis.inside ? targetsBetween(basis.inside, now, from) : [];
-  return { ...distances, now, from, targets, error: surfaceError(basis, now, from) };
+  return { ...distances, now, from, targets, ...surfaceErrors(basis, now, from) };
 }
 
 /** Return how each structure inside the lungs moves: the mean position of its vertices `at` and before, `was`, its
- * displacement `move` and distance `mm`, and the expected error, null if it is unknown. */
+ * displacement `move` and distance `mm`, and expected errors, null if they are unknown: `error` of the displacement,
+ * `session` of the position in the session of the scan, and `place` of the position on another day. */
 function targetsBetween(inside, now, from) {
   const found = pose(inside.library, now).targets(from.state);
-  const none = { name: '', at: [0, 0, 0], was: [0, 0, 0], move: [0, 0, 0], mm: 0, error: 1 };
+  const none = { name: '', at: [0, 0, 0], was: [0, 0, 0], move: [0, 0, 0], mm: 0, error: 1, session: 1, place: 1 };
   return inside.members.map((members) => {
     if (!members.length) return none;
-    const { name, at, move, mm, expectedError } = found.shift();
-    const error = Number.isNaN(expectedError) ? null : expectedError;
-    return { name: name || '(no name)', at, was: at.map((x, i) => x - move[i]), move, mm, error };
+    const { name, at, move, mm, expectedError, anotherDayError, movedError } = found.shift();
+    const errors = [movedError, expectedError, anotherDayError];
+    const [error, session, place] = errors.map((x) => (Number.isNaN(x) ? null : x));
+    return { name: name || '(no name)', at, was: at.map((x, i) => x - move[i]), move, mm, error, session, place };
   });
 }
 
@@ -142,11 +146,17 @@ function spotWords(basis, vertex) {
   return `${spots.reduce((most, spot) => (spot[0] > most[0] ? spot : most))[1]} of the ${basis.lungNames[lung]}`;
 }
 
-/** Return how far points lie from their computed place, for an expected error in mm. */
-function spreadWords(error, samePosture) {
-  const [half, most] = [0.9, 1.8].map((factor) => (factor * error).toFixed(0));
+/** Return how far points lie from their computed place, for the expected errors of positions in the session of the scan
+ * and on another day, mm. */
+function spreadWords(session, place, samePosture) {
+  const times = (factor) => [session, place].map((error) => (factor * error).toFixed(0));
+  const [half, halfOther] = times(0.9);
+  const [most, mostOther] = times(1.8);
   const extrapolated = samePosture ? '' : '; for a change of posture the error is an extrapolation';
-  return `Half of all points lie within ${half} mm of the computed place, 95 % within ${most} mm${extrapolated}.`;
+  return (
+    `Half of all points lie within ${half} mm of the computed place in the session of the scan, and within ` +
+    `${halfOther} mm on another day; 95 % within ${most} and ${mostOther} mm${extrapolated}.`
+  );
 }
 
 /** Return the sentence on a state of the lungs as {before, told, after, error, meaning}; `told`, which the page
@@ -156,7 +166,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
   const { name } = moved.from;
   const where = `${whereWords(gravity)}${above && `, ${above}`}, `;
   const who = target ? target.name : 'the surface';
-  const { mm, error } = target ?? { mm: moved.mean, error: moved.error };
+  const { mm, error, session, place } = target ?? { ...moved, mm: moved.mean };
   if (moved.largest < 0.05)
     return {
       before: `This is ${name}, from which displacements are measured.`,
@@ -166,7 +176,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
       meaning: '',
     };
   const stated = error === null ? '' : `expected error ${errorText(error)}`;
-  const half = error === null ? '' : spreadWords(error, near(gravity, moved.from.gravity));
+  const half = error === null ? '' : spreadWords(session, place, near(gravity, moved.from.gravity));
   if (!isTold({ mm, error }))
     return {
       before:

@@ -164,7 +164,7 @@ class Notes {
     const narrow = width < 720;
     const size = Math.min(92, height * 0.2, width * 0.15);
     const middle = [width - size - (narrow ? 10 : 172), size + 12];
-    const error = target.error ?? 0;
+    const error = target.place ?? 0;
     const grown = (0.92 * size) / Math.max(radius + error + 0.5 * target.mm, 10); // pixels for each mm in the lens
     drawTrace(context, was, at, Math.max(4, radius * scale), 0);
     context.fillStyle = context.strokeStyle = css('--line');

@@ -32,6 +32,12 @@
  * For a change of posture, all terms are extrapolations: nobody was scanned in two postures. Half
  * of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
  *
+ * A position and a displacement have different errors. The error of a position counts from the
+ * scan, whatever state its displacement is measured from.
+ *
+ * All these constants come from pairs of scans of one session. On another day, full inspirations of
+ * the same people differ: sigma_other^2 = sigma^2 + (6.2 mm)^2 (supine_expected_another_day).
+ *
  * Observed points correct the predicted positions by kriging, and the kriging variance replaces the
  * first three terms where it is smaller. If a rotation is fitted, or fewer than three points were
  * observed, it always replaces them. All errors are then multiplied by a factor that the points
@@ -56,6 +62,15 @@ extern "C" {
 /** Default of the factor c in the formula of the expected error (top of this file), mm. */
 #define SUPINE_EXPECTED_ERROR_MM 4.5
 
+/** RMS distance of two full inspirations of one person on different days, after a rigid motion and
+ * at the same volume, mm: landmarks of nine people, perhaps a year apart (NLST). It was 4.7 to 9.4
+ * mm, so that what is stated is 0.83 to 1.39 of the truth (tests/evidence/sessions.py). */
+#define SUPINE_ANOTHER_DAY_MM 6.2
+
+/** Return the expected error of a position on another day than that of the scan, mm, from that in
+ * the session of the scan: sqrt(same_session^2 + SUPINE_ANOTHER_DAY_MM^2). */
+SUPINE_API double supine_expected_another_day(double same_session);
+
 /** Terms of the formula of the expected error (top of this file). */
 typedef enum supine_expected_term {
   SUPINE_EXPECTED_DISPLACEMENT = 0,
@@ -66,8 +81,8 @@ typedef enum supine_expected_term {
   SUPINE_EXPECTED_TERMS
 } supine_expected_term;
 
-/** Compute the expected error of every vertex in a state, if the positions in state `from` are
- * exact.
+/** Compute the expected error of every vertex in a state: of its position if `from` is NULL, or of
+ * its displacement from the state `from`.
  *
  * Full inflation was assumed if the file was scanned at rest, and the volume at rest if it was not;
  * neither was, if the file has metadata "resting_known". Cost: up to eight evaluations of every

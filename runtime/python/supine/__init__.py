@@ -33,7 +33,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
                        OutOfMemoryError, ReadError, UnsupportedError)
 from ._program import save_fields
 
-__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "Deform", "Sample", "Basis",
+__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "another_day", "Deform", "Sample", "Basis",
            "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
            "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
            "OutOfMemoryError", "ReadError", "UnsupportedError"]
@@ -209,14 +209,18 @@ class _Owner:
 
 class Target(NamedTuple):
     """A named structure: its lung, the mean position `at` of its vertices, the displacement `move` of this position, its
-    length `mm`, and the expected error, mm (3-D RMS; NaN if unknown). Vectors are in mm, LPS. `anatomy` is true for a
-    large part, such as airways, vessels or a lobe, of which these are means, and false for a target."""
+    length `mm`, and the expected errors, mm (3-D RMS; NaN if unknown): of the position, in the session of the scan
+    (`expected_error`) and on another day (`another_day_error`), and of the displacement (`moved_error`). Vectors are in
+    mm, LPS. `anatomy` is true for a large part, such as airways, vessels or a lobe, of which these are means, and false
+    for a target."""
     name: str
     lung: str
     at: Doubles
     move: Doubles
     mm: float
     expected_error: float
+    another_day_error: float
+    moved_error: float
     anatomy: bool
 
 
@@ -366,10 +370,10 @@ class Basis:
         return out
 
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
-        """Compute the expected position error [N] of the vertices in a state, mm (3-D RMS). This assumes that the
-        positions in state `since`, or in the scan, are exact. Half of all points lie within 0.9 times their expected
+        """Compute the expected error [N] of the vertices in a state, mm (3-D RMS): of their positions in the session of
+        the scan, or of their displacements from the state `since`. Half of all points lie within 0.9 times their expected
         error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change of posture
-        they are extrapolated."""
+        they are extrapolated. On another day than that of the scan, positions have the error `another_day`."""
         sigma = np.empty(self.vertex_count, _FLOAT)
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
@@ -434,11 +438,12 @@ class Basis:
             _c.basis_pose(self._c, _state(since), origin)
         after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
-            sigma: Any = self.expected_error(state, volume, since)
+            sigma: Any = self.expected_error(state, volume)
+            moved: Any = self.expected_error(state, volume, since)
         except UnsupportedError:
-            sigma = np.full(self.vertex_count, np.nan)
+            sigma = moved = np.full(self.vertex_count, np.nan)
         anatomy = self.tensor("anatomy")
-        values = np.column_stack([after, after - before, sigma.astype(np.float64) ** 2])
+        values = np.column_stack([after, after - before, sigma.astype(np.float64) ** 2, moved.astype(np.float64) ** 2])
         names_of = [name for name, lung in self.lungs.items() for _ in range(lung.start, lung.stop)]
         made = []
         for i, name in enumerate(names.tobytes().decode().split("\n")):
@@ -446,7 +451,8 @@ class Basis:
             if vertices.size:
                 mean = values[vertices].mean(axis=0)
                 made.append(Target(name, names_of[vertices[0]], mean[:3], mean[3:6], float(np.linalg.norm(mean[3:6])),
-                                   float(np.sqrt(mean[6])), anatomy is not None and bool(anatomy[i])))
+                                   float(np.sqrt(mean[6])), _c.expected_another_day(float(np.sqrt(mean[6]))),
+                                   float(np.sqrt(mean[7])), anatomy is not None and bool(anatomy[i])))
         return made
 
     @property
@@ -620,6 +626,11 @@ class Location:
         xyz, sigma = np.empty((basis.vertex_count, 3), _FLOAT), np.empty(basis.vertex_count, _FLOAT)
         _c.locate_positions(self._c, basis._c, xyz.ctypes.data, sigma.ctypes.data)
         return xyz, sigma
+
+
+def another_day(same_session: ArrayLike) -> Doubles:
+    """Return the expected errors of positions on another day than that of the scan, mm, from those in its session."""
+    return np.hypot(np.asarray(same_session, np.float64), _c.expected_another_day(0.0))
 
 
 def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,

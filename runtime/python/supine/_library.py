@@ -364,6 +364,7 @@ doubt_sample = _checked("doubt_sample", c_void_p, c_size_t, c_uint64, c_size_t, 
 doubt_frame_space = _declare("doubt_frame_space", c_size_t, c_size_t)
 doubt_frame_prepare = _checked("doubt_frame_prepare", c_void_p, c_size_t, POINTER(c_size_t), c_void_p, POINTER(c_void_p))
 doubt_frame_errors = _posed("doubt_frame_errors", c_void_p, c_size_t, c_size_t, c_void_p)
+expected_another_day = _declare("expected_another_day", c_double, c_double)
 locate_space = _declare("locate_space", c_size_t, c_size_t)
 locate = _checked("locate", POINTER(LocateTask), POINTER(Residual), c_void_p, POINTER(c_void_p))
 location_info = _declare("location_get_info", POINTER(LocationInfo), c_void_p)
