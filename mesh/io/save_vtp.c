@@ -11,7 +11,7 @@
 
 #include "mesh/io/save.h"
 
-enum { VTP_ARRAYS = 9, VTP_FIRST_OF_POINTS = 3 };
+enum { VTP_FIRST_OF_POINTS = 3, VTP_ARRAYS = VTP_FIRST_OF_POINTS + 4 + SUPINE_MESH_SCALARS };
 
 /* Numbers of one point or triangle. */
 typedef union vtp_item {

@@ -41,9 +41,6 @@
 extern "C" {
 #endif
 
-/** Expected error of a position on another day at the same volume, mm. */
-#define SUPINE_ANOTHER_DAY_MM 6.2
-
 enum {
   SUPINE_DOUBT_STATES_MAX = 16,
   SUPINE_DOUBT_FIDUCIALS_LEAST = 3,
