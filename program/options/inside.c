@@ -116,8 +116,11 @@ supine_status supine_options_inside_open(const supine_basis *lungs, const char *
  * values. */
 static double rms_of(const supine_options_names *names, size_t begin, size_t end,
                      const float *values) {
-  double square = values == NULL ? (double)NAN : 0;
-  for (size_t i = begin; i < end && values != NULL; ++i) {
+  double square = 0;
+  if (values == NULL) {
+    return (double)NAN;
+  }
+  for (size_t i = begin; i < end; ++i) {
     const double value = (double)values[names->order[i]];
     square += value * value / (double)(end - begin);
   }
