@@ -110,7 +110,8 @@ static double factorise(const left_out *s, double *rows, double *factor) {
       factor[i * s->count + j] = rows[i * m + s->run[j]];
     }
   }
-  if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', (lapack_int)s->count, factor, (lapack_int)s->count) !=
+  /* The upper factor of columns is the lower one of rows. For columns, LAPACKE needs no memory. */
+  if (LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'U', (lapack_int)s->count, factor, (lapack_int)s->count) !=
       0) {
     return 0.0;
   }
