@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Print the figures on which the checks of another simulator's fields rest (docs/inputs.md, group Fields).
 
-    tests/evidence/fields.py BUILD MAP...
+    tests/evidence/fields.py BUILD [--sets] MAP...
 
 BUILD is the folder of the build, each MAP a label map of a person's lungs at full inflation. The default law stands for the
 simulator: the displacements from full inflation to rest, and from supine to other postures at rest, in several plans of
 directions. Each plan is fitted as `precompute --fields` fits it. Then caps of the sphere are left empty, and the error that
-is found in 150 other directions is divided by the leave-one-out error that would be stated."""
+is found in 150 other directions is divided by the leave-one-out error that would be stated.
+
+Last, or alone with --sets, right sets of fields and the same sets made wrong are measured as the checks of runs, points, units
+and axes measure them: the law of each map (at rest from two origins, and at five volumes), formulas on its surface (nonlinear
+in gravity and volume, one of them with a lung that opens late), and CalculiX where it is installed (tests/evidence/fem.py)."""
+import itertools
 import os
 import pathlib
+import shutil
 import sys
 import tempfile
 
@@ -110,11 +116,170 @@ def caps(basis, step):
     return rows
 
 
+class Set:
+    """Fields of a simulator: plan [M, 4] has a direction and a filling in each row, u [M, N, 3] the displacements."""
+
+    def __init__(self, name, points, faces, plan, u):
+        self.name, self.points, self.faces, self.plan, self.u = name, points, faces, np.asarray(plan, float), np.asarray(u, float)
+
+
+def grid(directions, volumes):
+    return np.array([[*g, s] for g in even(directions) for s in np.linspace(0, 1, volumes)])
+
+
+def formula_sets(points, faces):
+    """Return sets whose displacements are formulas: lungs that sag, and one lung that opens late."""
+    left = points[:, 0] > points[:, 0].mean()
+    place = np.where(left[:, None], points - points[left].mean(0), points - points[~left].mean(0)) / 100
+
+    def sag(g, s):
+        along = place @ g
+        return ((1 - 0.6 * s) * ((7 - 3 * (place ** 2).sum(1))[:, None] * g + 3 * np.tanh(along)[:, None] * place)
+                + 16 * s * place + 4 * s * s * place[:, 2:] ** 2 * [0, 0, -1])
+
+    def compress(g, s):
+        along = place @ g
+        return (8 * (1.2 - s / 2) * (1 - 0.3 * (place ** 2).sum(1))[:, None] * g - 3 * (along ** 2)[:, None] * g
+                - 1.5 * np.tanh(2 * along)[:, None] * place + 20 * (s - 1) * place)
+
+    def late(g, s):
+        filled = np.where(left, s, 1.15 * s ** 3 / (s ** 3 + 0.15)) * (1 + 0.12 * g[1] ** 3) + 0.06 * g[1] ** 3
+        return sag(g, 0) + (14 * filled - 8)[:, None] * place
+
+    plans = [("sags, 24", sag, grid(24, 1)), ("sags, 32 x 4", sag, grid(32, 4)), ("compresses, 24 x 4", compress, grid(24, 4)),
+             ("opens late, 24 x 6", late, grid(24, 6))]
+    return [Set(name, points, faces, plan, [law(row[:3], row[3]) for row in plan]) for name, law, plan in plans]
+
+
+def law_sets(package, path):
+    """Return the law of a person at rest, from supine and from full inflation, and at five volumes."""
+    basis = package.precompute(path, edge=12, held_out=20)
+    at = lambda g, volume: basis.deform(basis.pose(tuple(g), volume)).astype(float)
+    faces, supine, full, plan = np.array(basis.triangles), at((0, 1, 0), "scan"), basis.vertices.astype(float), grid(24, 5)
+    rest, name = np.array([at(g, "rest") for g in even(24)]), pathlib.Path(path).name.split(".")[0]
+    return [Set(f"{name}, rest", supine, faces, grid(24, 1), rest - supine), Set(f"{name}, from full", full, faces, grid(24, 1), rest - full),
+            Set(f"{name}, 24 x 5", supine, faces, plan, [at(row[:3], f"rest+{1500 * row[3]:.0f}") - supine for row in plan])]
+
+
+def calculix_sets(build, vertices=800):
+    """Return the sets that CalculiX computes (fem.py); none if it or TetGen is not installed."""
+    if not (shutil.which("ccx") and shutil.which("tetgen")):
+        return []
+    import fem
+    points, faces = fem.surface(str(build / "supine"), vertices)
+    sets = []
+    for law, plan in (("linear", grid(32, 1)), ("neo-Hookean", grid(32, 1)), ("neo-Hookean", grid(24, 6))):
+        deck, pressure = fem.Deck(points, faces, law), fem.PRESSURE if len(plan) > 32 else 0
+        u = [deck.solve(f"{len(sets)}_{i}", row[:3], pressure * row[3])[0] for i, row in enumerate(plan)]
+        sets.append(Set(f"CalculiX, {law}, {len(plan)}", points, faces, plan, u))
+    return sets
+
+
+def gravity_part(given):
+    """Displacements minus their mean over directions at each filling."""
+    moved = given.u.copy()
+    for fill in np.unique(given.plan[:, 3]):
+        moved[given.plan[:, 3] == fill] -= given.u[given.plan[:, 3] == fill].mean(0)
+    return moved
+
+
+def frame_gain(given):
+    """Motion along gravity that other axes of gravity gain, summed over three directions / RMS of what gravity changes."""
+    moved = gravity_part(given)
+    linear = 3 * np.einsum("mi,mj->ij", moved.mean(1), given.plan[:, :3]) / len(moved)
+    sums = [sum(sign * linear[i, j] for i, (j, sign) in enumerate(zip(order, signs)))
+            for order in itertools.permutations(range(3)) for signs in itertools.product((1, -1), repeat=3)]
+    return (max(sums) - np.trace(linear)) / np.sqrt((moved ** 2).sum(2).mean())
+
+
+def stray(given):
+    """Distance of a vertex from the mean displacement of its neighbours / largest such distance of these, and above a tenth of the RMS."""
+    edges = np.concatenate([given.faces[:, [i, j]] for i, j in itertools.permutations(range(3), 2)])
+    count, worst = np.bincount(edges[:, 0], minlength=len(given.points))[:, None].clip(1), 0
+    least = 0.1 * np.sqrt((given.u ** 2).sum(2).mean())
+    for u in given.u:
+        mean, spread = np.zeros_like(u), np.zeros(len(u))
+        np.add.at(mean, edges[:, 0], u[edges[:, 1]])
+        mean /= count
+        np.maximum.at(spread, edges[:, 0], np.linalg.norm(u[edges[:, 1]] - mean[edges[:, 0]], axis=1))
+        apart = np.linalg.norm(u - mean, axis=1)
+        worst = max(worst, (apart / spread.clip(1e-9))[apart > least].max(initial=0))
+    return worst
+
+
+def best_fit(plan, u, kept):
+    """Return band, order and the leave-one-out errors of the runs `kept`, of the fit with the least of them; volumes as `fill`."""
+    best = None
+    for order in range(1 if np.ptp(plan[:, 3]) > 0 else 0, min(4, len(np.unique(plan[kept, 3])) - 1) + 1):
+        for band in range(6):
+            a = fit_terms(plan[kept], band, order)
+            if a.shape[1] >= len(kept) or np.linalg.cond(a) > 100:
+                break
+            hat = a @ np.linalg.pinv(a)
+            if (1 - np.diag(hat)).min() < 1e-3:
+                break
+            error = np.linalg.norm((u[kept] - hat @ u[kept]) / (1 - np.diag(hat))[:, None], axis=1)
+            if best is None or (error ** 2).sum() < (best[2] ** 2).sum():
+                best = band, order, error
+    return best
+
+
+def fit_terms(plan, band, order):
+    t = np.polynomial.chebyshev.chebvander(2 * plan[:, 3] - 1, order)
+    return (terms(band, plan[:, :3])[:, :, None] * t[:, None]).reshape(len(plan), -1)
+
+
+def worst_run(given):
+    """Largest error of three runs that were taken out, predicted from the others / median error of these, above a twentieth of the RMS."""
+    u = given.u[:, ::max(1, len(given.points) // POINTS)].reshape(len(given.u), -1)
+    kept, out, size = np.arange(len(u)), [], np.sqrt((u ** 2).sum(1).mean())
+    band, order, error = best_fit(given.plan, u, kept)
+    while len(out) < min(3, len(u) // 8):
+        out.append(kept[error.argmax()])
+        kept = np.delete(kept, error.argmax())
+        band, order, error = best_fit(given.plan, u, kept)
+    weights = np.linalg.pinv(fit_terms(given.plan[kept], band, order))
+    missed = np.linalg.norm(u[out] - fit_terms(given.plan[out], band, order) @ (weights @ u[kept]), axis=1)
+    ratio = missed / np.median(error)
+    return ratio.max(), ratio[missed > 0.05 * size].max(initial=0)
+
+
+def made_wrong(given):
+    """Yield wrong versions of a set: what was done, and the set."""
+    change = lambda name, plan=given.plan, u=given.u: (name, Set(given.name, given.points, given.faces, plan, u))
+    edit = lambda name, act: (lambda u: (act(u), change(name, u=u))[1])(given.u.copy())
+    row = 7 if len(given.u) < 60 else 29
+    yield change("gravity negated", given.plan * [-1, -1, -1, 1])
+    yield change("gravity in RAS", given.plan * [-1, -1, 1, 1])
+    yield change("y and z exchanged", given.plan[:, [0, 2, 1, 3]])
+    yield change("x mirrored", given.plan * [-1, 1, 1, 1])
+    yield edit("a run of zeros", lambda u: u.__setitem__(row, 0))
+    yield edit("two runs exchanged", lambda u: u.__setitem__([row, row + 5], u[[row + 5, row]]))
+    yield edit("a point 60 mm off", lambda u: u.__setitem__((3, len(given.points) // 3, 0), u[3, len(given.points) // 3, 0] + 60))
+
+
+def measure_sets(package, build, paths):
+    sets = sum((law_sets(package, path) for path in paths), [])
+    sets += formula_sets(sets[0].points, sets[0].faces) + calculix_sets(build)
+    print(f"\n{'set':28} {'runs':>4} {'what is wrong':20} {'gravity, mm':>11} {'axes':>5} {'point':>6} {'run':>6} {'run, large':>10}")
+    for given in sets:
+        for wrong, now in [("", given), *made_wrong(given)]:
+            moved, run = np.sqrt((gravity_part(now) ** 2).sum(2).mean()), worst_run(now)
+            print(f"{given.name:28} {len(given.u):4} {wrong:20} {moved:11.1f} {frame_gain(now):5.2f} {stray(now):6.1f} {run[0]:6.1f} {run[1]:10.1f}",
+                  flush=True)
+
+
 def main():
     build = pathlib.Path(sys.argv[1]).resolve()
     os.environ["PATH"] = str(build) + os.pathsep + os.environ["PATH"]
+    paths = [os.path.abspath(path) for path in sys.argv[2:] if path != "--sets"]
     with tempfile.TemporaryDirectory() as folder:
-        measure(take_package(build, pathlib.Path(folder)), sys.argv[2:])
+        package = take_package(build, pathlib.Path(folder))
+        os.chdir(folder)
+        if "--sets" not in sys.argv:
+            measure(package, paths)
+        measure_sets(package, build, paths)
+        os.chdir("/")
 
 
 def measure(package, paths):
