@@ -23,26 +23,27 @@ import tempfile
 
 
 def last_displacements(path):
-    """Return the rows [node, ux, uy, uz] of the last table in a .dat file of CalculiX."""
-    rows = []
+    """Return the rows [node, ux, uy, uz] of the last table of displacements in a .dat file of CalculiX."""
+    rows, reading = [], False
     with open(path, encoding="ascii", errors="replace") as file:
         for line in file:
             words = line.split()
-            if "displacements" in line:
-                rows = []
-            elif len(words) == 4:
+            if any(word[:1].isalpha() for word in words):  # the title of a table
+                reading = words[0] == "displacements"
+                rows = [] if reading else rows
+            elif reading and len(words) == 4:
                 rows.append((int(words[0]), *map(float, words[1:])))
     return sorted(rows)
 
 
 def main():
     deck, *state, output = sys.argv[1:]
-    with open(deck, encoding="ascii") as file:
+    with open(deck, encoding="utf-8", errors="surrogateescape") as file:  # comments may have any letters
         text = file.read()
     for key, value in zip(("@X@", "@Y@", "@Z@", "@FILL@"), state):
         text = text.replace(key, value)
     with tempfile.TemporaryDirectory() as folder:
-        with open(os.path.join(folder, "run.inp"), "w", encoding="ascii") as file:
+        with open(os.path.join(folder, "run.inp"), "w", encoding="utf-8", errors="surrogateescape") as file:
             file.write(text)
         done = subprocess.run([os.environ.get("CCX", "ccx"), "run"], cwd=folder, capture_output=True, text=True, check=False,
                               errors="replace", env={"OMP_NUM_THREADS": "1", **os.environ})

@@ -62,3 +62,15 @@ echo 1,2 >"runs/$first.csv"
 python3 "$cohort/collect.py" fields.safetensors points.csv plan.csv runs 2>said && fail "a corrupt run was collected"
 grep -q "runs/$first.csv: line 1 has 2 numbers" said || fail "$(cat said)"
 [ ! -e fields.safetensors ] || fail "a file of corrupt runs"
+# a deck with letters that are not ASCII, and a CalculiX that prints displacements twice and forces after them
+printf '** Lunge, rechts: \303\274 \374\n@X@ @FILL@\n' >deck.inp
+cat >ccx <<'CCX'
+#!/bin/sh
+grep -q '^0.6 0.4$' "$1.inp" || exit 1
+printf '\n displacements (vx,vy,vz) for set P and time  0.5E+00\n\n 1 9 9 9\n 2 9 9 9\n' >"$1.dat"
+printf '\n displacements (vx,vy,vz) for set P and time  0.1E+01\n\n 2 4 5 6\n 1 1.5E+00 2 3\n' >>"$1.dat"
+printf '\n forces (fx,fy,fz) for set P and time  0.1E+01\n\n 1 7 7 7\n 2 7 7 7\n' >>"$1.dat"
+CCX
+chmod +x ccx
+CCX="$work/ccx" python3 "$cohort/calculix.py" deck.inp 0.6 0 0.8 0.4 run.csv || fail "a deck that is not ASCII"
+[ "$(tr '\n' ' ' <run.csv)" = "1.5,2,3 4,5,6 " ] || fail "displacements beside forces: $(cat run.csv)"
