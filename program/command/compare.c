@@ -104,7 +104,9 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
     memcpy(row.move, hilum.move, sizeof row.move);
     row.moved = supine_length(hilum.move);
     row.moved_error = hilum.expected;
-    row.error = row.another_error = (double)NAN;
+    SUPINE_TRY(supine_options_hilum(basis, &item[1]->state, &scan, in_hilum, &hilum, error));
+    row.error = hilum.expected;
+    row.another_error = supine_expected_another_day(hilum.expected);
     row.volume[0] = row.volume[1] = targets[0].volume[0] != 0.0 ? (double)NAN : 0.0;
     add_target(item, &row, lists);
   }
