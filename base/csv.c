@@ -288,19 +288,20 @@ static supine_status find_columns(supine_csv *csv, char *text, const char *const
   return SUPINE_OK;
 }
 
-/* Return the order of bytes that a byte-order mark of UTF-16 states: 1 if the lower byte is first,
- * 2 if it is second, 0 if there is no mark. */
+/* Find the order of bytes that a byte-order mark of UTF-16 states: 1 if the lower byte is first, 2
+ * if it is second, 0 if there is no mark; -1 for bytes that no text begins with. The file may be a
+ * pipe, to which one byte alone can be given back. */
 static int order_of(FILE *file) {
   const int first = getc(file);
+  if (first != 0xFF && first != 0xFE) {
+    (void)ungetc(first, file);
+    return 0;
+  }
   const int second = getc(file);
   if (first == 0xFF && second == 0xFE) {
     return 1;
   }
-  if (first == 0xFE && second == 0xFF) {
-    return 2;
-  }
-  rewind(file);
-  return 0;
+  return first == 0xFE && second == 0xFF ? 2 : -1;
 }
 
 /* Read the next unit of UTF-16; return false at the end of the file. */
@@ -322,28 +323,23 @@ static void put_utf8(FILE *out, unsigned code) {
   }
 }
 
-/* Convert the rest of the file from UTF-16, as Excel writes "Unicode text", to UTF-8 in memory. */
+/* Convert the rest of the file from UTF-16, as Excel writes "Unicode text", to UTF-8 in a file
+ * without a name. */
 static supine_status decode(supine_csv *csv, int order, supine_error *error) {
-  size_t size = 0;
   unsigned unit = 0;
-  FILE *out = open_memstream(&csv->decoded, &size);
-  if (out == NULL) {
-    return supine_error_memory(error, "the text of %s", csv->path);
-  }
+  FILE *out = tmpfile();
+  SUPINE_REFUSE_IF(out == NULL, error, SUPINE_ERROR_WRITE,
+                   "%s: no temporary file for its text, which is UTF-16: save it as UTF-8",
+                   csv->path);
   while (next_unit(csv->file, order, &unit)) {
     unsigned low = 0;
     const bool pair = unit >= 0xD800 && unit < 0xDC00 && next_unit(csv->file, order, &low);
     put_utf8(out, pair ? 0x10000 + ((unit & 0x3FF) << 10) + (low & 0x3FF) : unit);
   }
-  if (fclose(out) != 0) {
-    return supine_error_memory(error, "the text of %s", csv->path);
-  }
-  FILE *text = fmemopen(csv->decoded, size > 0 ? size : 1, "rb");
-  if (text == NULL) {
-    return supine_error_memory(error, "the text of %s", csv->path);
-  }
   (void)fclose(csv->file);
-  csv->file = text;
+  csv->file = out;
+  SUPINE_REFUSE_IF(fflush(out) != 0 || fseek(out, 0, SEEK_SET) != 0, error, SUPINE_ERROR_WRITE,
+                   "%s: the temporary file for its text cannot be written", csv->path);
   return SUPINE_OK;
 }
 
@@ -353,7 +349,13 @@ static supine_status csv_open(const char *path, supine_csv *csv, supine_error *e
   SUPINE_REFUSE_IF(csv->file == NULL, error, SUPINE_ERROR_READ, "%s: cannot open: %s", path,
                    strerror(errno));
   const int order = order_of(csv->file);
-  const supine_status status = order > 0 ? decode(csv, order, error) : SUPINE_OK;
+  supine_status status = SUPINE_OK;
+  if (order < 0) {
+    status = supine_error_set(error, SUPINE_ERROR_FORMAT,
+                              "%s: is no text in UTF-8 or UTF-16: save it as CSV", path);
+  } else if (order > 0) {
+    status = decode(csv, order, error);
+  }
   if (status != SUPINE_OK) {
     supine_csv_close(csv);
   }
@@ -448,7 +450,6 @@ void supine_csv_close(supine_csv *csv) {
   supine_file_close(&csv->file);
   free(csv->text);
   free(csv->next);
-  free(csv->decoded);
   *csv = (supine_csv){0};
 }
 

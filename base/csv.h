@@ -33,7 +33,6 @@ typedef struct supine_csv {
   size_t column_count;                  /* number of fields of the header */
   size_t column[SUPINE_CSV_FIELDS_MAX]; /* index of each expected column; SIZE_MAX if absent */
   double scale[SUPINE_CSV_FIELDS_MAX];  /* unit of each expected column; 1 if it names none */
-  char *decoded;                        /* text of a file in UTF-16, converted to UTF-8 */
 } supine_csv;
 
 /* Open a file and read its header. `names` are the `count` columns that the caller expects. The

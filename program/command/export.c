@@ -203,7 +203,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    "%s holds another simulator's fields of gravity, which have no breaths: leave "
                    "--breath and --animate out",
                    path);
-  SUPINE_TRY(judge_breath(basis, wanted->glb.breath, error));
+  if (wanted->breathes) {
+    SUPINE_TRY(judge_breath(basis, wanted->glb.breath, error));
+  }
   return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
 }
 

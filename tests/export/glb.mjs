@@ -180,7 +180,7 @@ const at95 = (list) => list.sort((a, b) => a - b)[Math.floor(0.95 * list.length)
 /** Check positions, displacement factors and normals in random states. */
 async function check(basis, words, tolerance) {
   const path = join(folder, 'lungs.glb');
-  supine('export', basis, '-o', path, '--breath', String(BREATH), ...words);
+  supine('export', basis, '-o', path, '--breath', `${BREATH}mL`, ...words);
   await validate(path);
   const { lungs, meshes, extras } = await open(path);
   assert.deepEqual(

@@ -120,7 +120,7 @@ TEST(test_precompute_basis_wrong_options_refused) {
   refuse(&options, SUPINE_ERROR_ARGUMENT, "give 1 to 64");
   options = few_modes();
   options.tissue.share[1] = 1.5;
-  refuse(&options, SUPINE_ERROR_ARGUMENT, "above 0 and at most 1");
+  refuse(&options, SUPINE_ERROR_ARGUMENT, "give 0.1, which the tissue alone fills, to 1");
   options = few_modes();
   options.volumes.rest[SUPINE_REST_PRONE].share[0] = 3.0;
   refuse(&options, SUPINE_ERROR_ARGUMENT, "volume at rest in posture prone");

@@ -53,8 +53,8 @@ def check_volumes():
     """Compare structures of which one encloses no volume. Its row of the table has '-' in the last two columns."""
     for order in (["body.ply", "flat.ply"], ["flat.ply", "body.ply"]):
         run("embed", "lungs.safetensors", *order, "-o", "inside.safetensors")
-        printed = run("compare", "lungs.safetensors", "--inside", "inside.safetensors", "--posture", "supine",
-                      "--posture", "prone")
+        printed = run("compare", "lungs.safetensors", "--inside", "inside.safetensors", "--postures",
+                      "supine,prone")
         lines = printed.splitlines()
         begin = lines.index("targets")
         assert lines[begin + 1].endswith("volume after, mL"), lines[begin + 1]
@@ -76,8 +76,8 @@ def check_control_characters():
             (run("info", "renamed.safetensors"), f"lungs{ESCAPED}"),
             (run("info", "points.safetensors"), ""),
             (run("info", "renamed.safetensors", "--json"), ""),
-            (run("compare", "renamed.safetensors", "--inside", "points.safetensors", "--posture", "supine", "--posture",
-                 "prone"), f"nodule{NAME}"),
+            (run("compare", "renamed.safetensors", "--inside", "points.safetensors", "--postures",
+                 "supine,prone"), f"nodule{NAME}"),
             (run("locate", "renamed.safetensors", "observed.csv", "--points", "points.safetensors", "-o", "found.csv", code=2), f"other{NAME}")):
         assert kept in printed, f"{kept!r} is not in {printed!r}"
         for character in printed.replace("\n", ""):
