@@ -47,7 +47,7 @@ void supine_io_save_xyz(const mesh_writer *writer) {
         "runtime/include/supine/inputs.h": ("  SUPINE_INPUT_COUNT ", "  SUPINE_INPUT_PHANTOM_SIZE,\n  SUPINE_INPUT_COUNT "),
         "base/inputs.c": ("};\n/* clang-format on */", """  [SUPINE_INPUT_PHANTOM_SIZE] = {
     .name = "phantom-size", .group = "Words", .input = "a number of vertices", .against = "screens",
-    .measured = "vertices", .told = NAN, .refused = 40000, .evidence = EVIDENCE("assumed"),
+    .measured = "vertices", .told = NAN, .refused = 40000, .evidence = TEXT("assumed"),
     .remedy = "give fewer", .interfaces = COMMAND},
 };
 /* clang-format on */"""),
