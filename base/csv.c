@@ -338,7 +338,8 @@ static supine_status decode(supine_csv *csv, int order, supine_error *error) {
   }
   (void)fclose(csv->file);
   csv->file = out;
-  SUPINE_REFUSE_IF(fflush(out) != 0 || fseek(out, 0, SEEK_SET) != 0, error, SUPINE_ERROR_WRITE,
+  const bool written = fflush(out) == 0 && fseek(out, 0, SEEK_SET) == 0;
+  SUPINE_REFUSE_IF(!written, error, SUPINE_ERROR_WRITE,
                    "%s: the temporary file for its text cannot be written", csv->path);
   return SUPINE_OK;
 }
