@@ -283,6 +283,15 @@ function simulatedWeights({ band, order, modes, modeUnit }, lungs, gravity, volu
   });
 }
 
+/** Check that the limits of the extras hold `volumes` along gravity, mL, as the simulations did. */
+function checkLimits(lungs, gravity, volumes) {
+  lungs.forEach(({ userData: { supine: own } }, lung) => {
+    const y = harmonics(Math.sqrt(own.limits.length / 2) - 1, gravity);
+    const [low, high] = [0, y.length].map((at) => own.referenceVolume + dot(y, own.limits.slice(at, at + y.length)));
+    assert.ok(low < volumes[lung] && volumes[lung] < high && high - low < 2500, `lung ${lung}: ${low} to ${high} mL`);
+  });
+}
+
 /** Check positions of another simulator's fields over gravity and volume, whose lungs have weights of their own,
  * against those of 'supine deform'. */
 async function checkBreathingFields(storage) {
@@ -318,6 +327,7 @@ async function checkBreathingFields(storage) {
       [3200, 3600],
     ],
   ]) {
+    checkLimits(lungs, gravity, volumes);
     const weights = simulatedWeights(extras, lungs, gravity, volumes);
     for (const w of weights)
       assert.ok(

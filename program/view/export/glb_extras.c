@@ -46,7 +46,8 @@ static const char simulated_text[] =
     "'volume' "
     "gives V. In the direction g, the simulations held V from low to high, with low = sum over i "
     "of "
-    "limits[i] * Y[i](g) and high = sum over i of limits[9 + i] * Y[i](g)";
+    "limits[i] * Y[i](g) and high = sum over i of limits[n + i] * Y[i](g), where n is half the "
+    "length of limits";
 static const char simulated_rest_text[] =
     "volume of a lung at rest minus referenceVolume, mL: sum over l <= 2 and m of resting[l*l+l+m] "
     "* Y[l*l+l+m](g)";
@@ -140,11 +141,12 @@ json_t *supine_export_glb_lung_extras(const glb *g, size_t lung) {
   }
   if (info->order > 0) {
     const double *range = supine_basis_tensor(g->basis, "simulated_range")->data;
-    const double *limits = supine_basis_tensor(g->basis, "simulated_limits")->data;
+    const supine_tensor *limits = supine_basis_tensor(g->basis, "simulated_limits");
+    const size_t numbers = 2 * limits->shape[2]; /* harmonics of the least and the most volume */
     (void)json_object_set_new(supine, "range", supine_options_json_numbers(2, range + 2 * lung));
     (void)json_object_set_new(
         supine, "limits",
-        supine_options_json_numbers(2 * RESTING_TERMS, limits + lung * 2 * RESTING_TERMS));
+        supine_options_json_numbers(numbers, (const double *)limits->data + lung * numbers));
   }
   if (has_volume(g)) {
     (void)json_object_update_new(

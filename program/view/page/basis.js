@@ -118,12 +118,15 @@ function takeShared({ modes, band, order, lungBegin }) {
     full_volume: [lungs, second],
     volume_range: [27, lungs, 2],
     simulated_range: [lungs, 2],
-    simulated_limits: [lungs, 2, second],
   };
   const taken = Object.entries(shapes).map(([name, shape]) => [name, [shape, takeTensor(name, Float64Array)]]);
+  const limits = takeTensor('simulated_limits', Float64Array);
   const shares = takeTensor('simulated_shares', Float64Array);
-  const orders = (shares?.length ?? 0) / lungs / second;
-  return { ...Object.fromEntries(taken), simulated_shares: [[lungs, second, orders], shares] };
+  return {
+    ...Object.fromEntries(taken),
+    simulated_limits: [[lungs, 2, (limits?.length ?? 0) / lungs / 2], limits],
+    simulated_shares: [[lungs, second, (shares?.length ?? 0) / lungs / second], shares],
+  };
 }
 
 /** Return the tensors lungs_squares and lungs_box, for expected errors of vertices that are not all of the lungs'. */
