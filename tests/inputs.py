@@ -7,6 +7,7 @@ show the verdicts: taken, told (a warning) or refused. All interfaces must give 
 The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target `npm`
 was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
 import ctypes
+import functools
 import os
 import struct
 import sys
@@ -91,6 +92,7 @@ def breath(ml):
 
 def gained(gain):
     """The displacements of lungs whose volumes at rest and at full inflation are unknown, multiplied by a gain."""
+    @functools.cache  # the C library uses it while it is open
     def basis():
         if not os.path.exists("unknown.safetensors"):
             supine.precompute("lungs.ply", scanned="none", held_out=20, output="unknown.safetensors")
