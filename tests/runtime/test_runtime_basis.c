@@ -581,6 +581,63 @@ TEST(test_pose_gain_beyond_limits_refused_unless_allowed) {
   fixture_destroy(f);
 }
 
+/* Create two lungs that grow with the gain, the second one slightly less, and that hold `share` of
+ * their reference volumes at most. */
+static fixture *create_growing(double share, double held[27][2][2]) {
+  fixture *f = fixture_create_shrinking(200, 2, 5);
+  for (size_t i = 3 * f->lung_begin[1]; i < 3 * f->vertices; ++i) {
+    f->direction[i] *= 0.98F;
+  }
+  fixture_add_forms(f);
+  double *reference = fixture_allocate(3 * f->vertices, sizeof *reference);
+  for (size_t i = 0; i < 3 * f->vertices; ++i) {
+    reference[i] = (double)f->vertex[i];
+  }
+  for (size_t lung = 0; lung < 2; ++lung) {
+    const double volume = fixture_volume(f, lung, reference);
+    for (size_t node = 0; node < 27; ++node) {
+      held[node][lung][0] = 0.1 * volume;
+      held[node][lung][1] = share * volume;
+    }
+  }
+  free(reference);
+  f->resting = resting;
+  f->held = held[0][0];
+  return f;
+}
+
+/* A lung that was found not to fold up to the largest volume that is tried may pass it a little,
+ * while the volume of both stays below; a lung that folds before may not. */
+TEST(test_pose_gain_beyond_tried_volumes_taken_unless_folds) {
+  static const double gravity[3] = {1, 0, 0};
+  static const double gain = 0.3142; /* (1 + 0.2 gain)^3 = 1.2006 */
+  for (int folds = 0; folds < 2; ++folds) {
+    double held[27][2][2];
+    size_t size = 0;
+    fixture *f = create_growing(folds == 1 ? 1.19 : 1.2, held);
+    unsigned char *bytes = fixture_bytes(f, &size);
+    supine_basis *basis = NULL;
+    supine_pose pose;
+    supine_error error;
+    double volumes[2];
+    assert_int_equal(supine_basis_open_memory(bytes, size, &basis, &error), SUPINE_OK);
+    assert_int_equal(supine_basis_pose_gain(basis, gravity, gain, &pose, &error),
+                     folds == 1 ? SUPINE_ERROR_NUMERICAL : SUPINE_OK);
+    if (folds == 1) {
+      assert_non_null(strstr(error.message, "the surface folds"));
+    } else {
+      assert_int_equal(supine_basis_volumes(basis, &pose, volumes), SUPINE_OK);
+      assert_true(volumes[0] > 1.2 * supine_basis_get_info(basis)->reference_volume[0]);
+    }
+    assert_int_equal(supine_basis_pose_gain(basis, gravity, 0.33, &pose, &error),
+                     SUPINE_ERROR_NUMERICAL);
+    assert_non_null(strstr(error.message, "of full inflation"));
+    supine_basis_close(basis);
+    free(bytes);
+    fixture_destroy(f);
+  }
+}
+
 TEST(test_accessors_open_basis_equal_file) {
   check_view(false, true);
   check_view(true, true);
