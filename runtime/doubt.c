@@ -120,7 +120,7 @@ supine_status supine_doubt_prepare(const supine_doubt_task *task, double *space,
   supine_status status = SUPINE_OK;
   for (size_t s = 0; s < task->state_count && status == SUPINE_OK; ++s) {
     supine_pose pose;
-    double unit[2][3];
+    double unit[2][3] = {{0}};
     status = supine_basis_pose(task->basis, &task->states[s], &pose, error); /* refuses volumes */
     if (status == SUPINE_OK) {
       status =
