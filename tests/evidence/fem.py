@@ -219,11 +219,12 @@ def follow_guide(supine, points, faces):
 
 
 def take_plan(build, directions, volumes=0):
-    """Return a plan of simulations that the program prints: directions of gravity and, for several volumes, the filling."""
+    """Return a plan of simulations that the program prints: directions of gravity and, for several volumes, the filling.
+    The numbers of its runs are left out, as the fields keep its order."""
     more = ["--volumes", str(volumes)] if volumes else []
     rows = subprocess.run([build / "supine", "precompute", "--directions", str(directions), *more], check=True, text=True,
                           stdout=subprocess.PIPE).stdout.split()[1:]
-    return np.array([row.split(",") for row in rows], float)
+    return np.array([row.split(",")[:4] for row in rows], float)
 
 
 def main():
