@@ -373,14 +373,17 @@ async function checkMany() {
   await close(page);
 }
 
-/** Return the displacement of a structure and its expected error, mm, that `supine deform` states at a volume above
- * rest. */
+/** Return the displacement of a structure, and the expected error of its position on another day, mm, that `supine
+ * deform` states at a volume above rest. */
 function statedFor(name, depth) {
   const state = ['--from', 'supine:rest', '--posture', 'supine', '--volume', `rest+${depth}`];
   supine('deform', files['inside.safetensors'], ...state, '-o', files['moved.csv']);
-  const lines = readFileSync(files['moved.csv'], 'utf8').split('\n');
-  const row = lines.find((line) => line.replaceAll('"', '').startsWith(`${name},`)).split(',');
-  return [row.at(-2), row.at(-1)].map(Number);
+  const lines = readFileSync(files['moved.csv'], 'utf8')
+    .split('\n')
+    .filter((line) => !line.startsWith('#'))
+    .map((line) => line.replaceAll('"', '').split(','));
+  const row = lines.find(([first]) => first === name);
+  return ['moved_mm', 'another_day_error_mm'].map((column) => Number(row[lines[0].indexOf(column)]));
 }
 
 /** Check that, in the middle of a breath and after a jump, the lens has the displacement and the expected error that
