@@ -232,7 +232,7 @@ def main():
         if shutil.which(wanted) is None:
             sys.exit(print(f"skipped: {wanted} is not installed (Debian: calculix-ccx, tetgen)") or 77)
     build, vertices = pathlib.Path(sys.argv[1]).resolve(), int(sys.argv[2]) if len(sys.argv) > 2 else 1200
-    os.environ["PATH"] = f"{build}:{os.environ['PATH']}"
+    os.environ["PATH"] = f"{build}:{os.path.dirname(sys.executable)}:{os.environ['PATH']}"  # the guide runs python3
     with tempfile.TemporaryDirectory() as folder:
         os.environ["PYTHONPATH"] = folder
         os.chdir(folder)
