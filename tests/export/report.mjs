@@ -227,8 +227,8 @@ for (const format of ['A4', 'Letter']) {
     'basismadeby',
     'comparelungs.safetensors',
     'notfordiagnosis',
-    'lawdeep',
-    'stateinthescanfull',
+    'lawofdisplacementdeep',
+    'stateinthescansupineatfullinflation',
     'checksumxxh64:',
   ])
     assert.ok(packed.includes(word), `no ${word}`);
