@@ -8,6 +8,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -60,7 +61,11 @@ with tempfile.TemporaryDirectory() as folder:
         run("deform", "i.safetensors", "--posture", "prone", "-o", "o.csv")
         run("deform", "b.safetensors", "--posture", "prone", "-o", "o.ply")
         code = "import supine, json; b = supine.open('b.safetensors'); print(json.dumps([[f._asdict() for f in b.facts], b.caveats]))"
-        beside = {**os.environ, "PYTHONPATH": f"{source}/runtime/python", "LD_LIBRARY_PATH": os.path.dirname(library)}
+        package = os.path.join(folder, "python", "supine")
+        if not os.path.isdir(package):
+            shutil.copytree(os.path.join(source, "runtime/python/supine"), package)
+            shutil.copy(library, os.path.join(package, "libsupine_runtime.so"))
+        beside = {**os.environ, "PYTHONPATH": os.path.join(folder, "python")}
         python = subprocess.run([sys.executable, "-c", code], cwd=folder, env=beside, text=True, capture_output=True, check=False)
         assert python.returncode == 0, python.stderr
         listed, line = json.loads(python.stdout)
