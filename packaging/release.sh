@@ -114,7 +114,7 @@ mkdir -p "$top/bin" "$top/lib" "$top/share/doc/supine/libraries"
 cp "$work/stage/all/bin/supine" "$top/bin"
 cp -r "$work/stage/all/share/man" "$work/stage/all/share/bash-completion" "$top/share"
 cp README.md CHANGELOG.md LICENSE LICENSES/* "$top/share/doc/supine"
-strings "$top/bin/supine" | grep -x 'lib[a-z0-9_]*\.so\.[0-9a-z.]*' | sort -u | while read -r library; do
+strings "$top/bin/supine" | grep -x 'lib[a-z0-9_.-]*\.so\.[0-9a-z.]*' | sort -u | while read -r library; do
   ldconfig -p | awk -v name="$library" '$1 == name { print $NF; exit }'
 done | xargs ldd "$top/bin/supine" | awk '$1 ~ /:$/ { print substr($1, 1, length($1) - 1) } $3 ~ /^\// { print $3 }' |
   grep '/lib[^/]*\.so' | grep -vE '/lib(c|m|dl|rt|pthread|resolv)\.so' | sort -u >"$work/stage/libraries"
