@@ -3,8 +3,8 @@
 
     python3 calculix.py DECK X Y Z FILL OUTPUT.csv
 
-DECK is an input of CalculiX in which @X@, @Y@ and @Z@ stand for the direction of gravity and @FILL@ for the filling, 0 to
-1, such as
+DECK is an input of CalculiX in which @X@, @Y@ and @Z@ stand for the direction of gravity and @FILL@ for the filling, 0
+to 1, such as
 
     *AMPLITUDE, NAME=FILL
     0., 0., 1., @FILL@
@@ -45,8 +45,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "run.inp"), "w", encoding="utf-8", errors="surrogateescape") as file:
             file.write(text)
-        done = subprocess.run([os.environ.get("CCX", "ccx"), "run"], cwd=folder, capture_output=True, text=True, check=False,
-                              errors="replace", env={"OMP_NUM_THREADS": "1", **os.environ})
+        done = subprocess.run([os.environ.get("CCX", "ccx"), "run"], cwd=folder, capture_output=True, text=True,
+                              check=False, errors="replace", env={"OMP_NUM_THREADS": "1", **os.environ})
         result = os.path.join(folder, "run.dat")
         rows = last_displacements(result) if os.path.exists(result) else []
         if done.returncode != 0 or "*ERROR" in done.stdout or not rows:

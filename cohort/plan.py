@@ -10,7 +10,8 @@ import sys
 
 
 def read_plan(path):
-    """Return a dictionary from the name of each run to its state [x, y, z, fill], as texts; fill is 0 without such a column."""
+    """Return a dictionary from the name of each run to its state [x, y, z, fill], as texts; fill is 0 without such a
+    column."""
     runs = {}
     with open(path, encoding="utf-8", newline="") as file:
         for line, row in enumerate(csv.DictReader(file), 2):

@@ -58,7 +58,8 @@ POSTURES = ("supine", "prone", "left", "right")
 
 def enclosed(faces):
     """Return the volume that triangles enclose, mL."""
-    return abs(sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    return abs(sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                   a[2] * (b[0] * c[1] - b[1] * c[0])
                    for a, b, c in faces) / 6000)
 
 
@@ -88,9 +89,9 @@ def surface(posture, volume):
 
 
 def shares():
-    """Return the least and the greatest volume of a lung divided by that of its box, and the largest distance of the box's
-    length (feet to head) at 250 mL from the mean of those at 0 and 500 mL, in percent of their difference, in a breath of
-    500 mL in four postures."""
+    """Return the least and the greatest volume of a lung divided by that of its box, and the largest distance of the
+    box's length (feet to head) at 250 mL from the mean of those at 0 and 500 mL, in percent of their difference, in a
+    breath of 500 mL in four postures."""
     found, bent = [], []
     for posture in POSTURES:
         length = []
@@ -107,7 +108,8 @@ def shares():
 def bends():
     """Return the least and the greatest distance of a path's middle from the chord, in percent of the chord's length.
 
-    The path is that of the vertex that moves most, from rest to 500 mL above it; one number for each of four postures."""
+    The path is that of the vertex that moves most, from rest to 500 mL above it; one number for each of four
+    postures."""
     percents = []
     for posture in POSTURES:
         a, b, c = (surface(posture, volume)[0] for volume in ("rest", "rest+250", "rest+500"))
@@ -127,8 +129,8 @@ fewest = json.loads(run("info", "basis.safetensors", "--json"))
 run("precompute", "lungs.ply", "--band", "3", "--modes", "harmonics", "-o", "basis.safetensors")
 default_first = json.loads(run("info", "basis.safetensors", "--json"))
 subprocess.run([supine, "phantom", "-o", "small.ply", "--vertices", "160"], check=True, capture_output=True)
-iterated = subprocess.run([supine, "solve", "small.ply", "--law", "paper", "--posture", "prone", "--pitcher-catcher", "-o",
-                           "x.ply"], check=True, capture_output=True, text=True)
+iterated = subprocess.run([supine, "solve", "small.ply", "--law", "paper", "--posture", "prone", "--pitcher-catcher",
+                           "-o", "x.ply"], check=True, capture_output=True, text=True)
 iterated = " ".join((iterated.stdout + iterated.stderr).split())
 best, first = info(), info("--band", "3", "--modes", "harmonics")
 soft_best = info("--reach", "10", "--soften", "1")
@@ -141,13 +143,14 @@ ring = rows("fig9_ring")
 
 
 def radius(column, stiff=None):
-    """Return the mean radius of the ring whose x is in the given column and whose y is in the next one: of all points, of
-    the third that one ring has stiffer, or of the others. The last row of the table repeats the first."""
+    """Return the mean radius of the ring whose x is in the given column and whose y is in the next one: of all points,
+    of the third that one ring has stiffer, or of the others. The last row of the table repeats the first."""
     keys = list(ring[0])
     x, y = keys[keys.index(column)], keys[keys.index(column) + 1]
     points = ring[:-1]
     third = range(len(points) // 3, 2 * len(points) // 3)
-    of = [math.hypot(float(row[x]), float(row[y])) for i, row in enumerate(points) if stiff is None or (i in third) == stiff]
+    of = [math.hypot(float(row[x]), float(row[y])) for i, row in enumerate(points) if stiff is None
+          or (i in third) == stiff]
     return sum(of) / len(of)
 
 
@@ -161,7 +164,9 @@ def percent(basis):
 
 
 steps, left = re.findall(r"(\d+) steps, (\S+) of the force not yet balanced", iterated)[-1]
-pitcher = f"{steps} steps leave {left} of the force; {re.search(r'largest difference from the direct solution [0-9.e-]+', iterated)[0]} (184 vertices); of a real left lung of 5,001 vertices, 160,032 steps leave 4.7e-05, and the difference is 7.5e-07"
+difference = re.search(r"largest difference from the direct solution [0-9.e-]+", iterated)[0]
+pitcher = (f"{steps} steps leave {left} of the force; {difference} (184 vertices); of a real left lung of 5,001 "
+           f"vertices, 160,032 steps leave 4.7e-05, and the difference is 7.5e-07")
 
 
 def operations(basis):
@@ -173,8 +178,8 @@ print(f"""# The paper, row by row
 Santhanam, Imielinska, Davenport, Kupelian and Rolland, "Modeling Real-Time 3-D Lung Deformations for Medical
 Visualization", IEEE Trans. Inf. Technol. Biomed. 12(2), 2008. Each row names the command or program that
 reproduces a part of the paper, its result, and what differs here. `python3 docs/paper.py build/release > docs/paper.md`
-makes this file from synthetic lungs of {best['vertices']:,} vertices. Ranges of real lungs are from the programs that a row
-names; the four real pairs are chaste, covid001, covid002 and covid005, one pair or lung is chaste's.
+makes this file from synthetic lungs of {best['vertices']:,} vertices. Ranges of real lungs are from the programs that a
+row names; the four real pairs are chaste, covid001, covid002 and covid005, one pair or lung is chaste's.
 
 | in the paper | reproduced by | result | difference |
 |---|---|---|---|

@@ -9,9 +9,9 @@ Addresses stay the same from build to build:
     NAME.html              docs/NAME.md
     reference/index.html   the C headers, which doxygen has written there before
 
-Each page has a column of contents: the guide in the order of its table, then other pages. Only the Markdown that the pages
-use is known: headings, paragraphs, lists, tables, code, links, pictures, bold and italic type. Links to files of the
-repository that are not on the site become plain text."""
+Each page has a column of contents: the guide in the order of its table, then other pages. Only the Markdown that the
+pages use is known: headings, paragraphs, lists, tables, code, links, pictures, bold and italic type. Links to files of
+the repository that are not on the site become plain text."""
 import html
 import os
 import posixpath
@@ -23,15 +23,19 @@ source, demo, site = sys.argv[1:4]
 OTHERS = ["model", "accuracy", "paper", "trust", "inputs", "compare", "promises", "platforms"]
 
 STYLE = """
-:root { color-scheme: light dark; --ink: #121d2b; --soft: #4b596b; --line: #d5dce6; --ground: #fff; --code: #f1f4f8; --link: #0e6370; }
+:root { color-scheme: light dark;
+  --ink: #121d2b; --soft: #4b596b; --line: #d5dce6; --ground: #fff; --code: #f1f4f8; --link: #0e6370; }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #edf2f7; --soft: #a6b4c4; --line: #2c3947; --ground: #0d1219; --code: #18212c; --link: #6fd0dd; }
 }
 * { box-sizing: border-box; }
-body { margin: 0; color: var(--ink); background: var(--ground); font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
+body { margin: 0; color: var(--ink); background: var(--ground);
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 a { color: var(--link); }
-#page { display: grid; grid-template-columns: 260px minmax(0, 760px); gap: 0 48px; max-width: 1160px; margin: 0 auto; padding: 24px; }
-nav { position: sticky; top: 24px; align-self: start; max-height: calc(100vh - 48px); overflow-y: auto; font-size: 14px; }
+#page { display: grid; grid-template-columns: 260px minmax(0, 760px); gap: 0 48px;
+  max-width: 1160px; margin: 0 auto; padding: 24px; }
+nav { position: sticky; top: 24px; align-self: start; max-height: calc(100vh - 48px);
+  overflow-y: auto; font-size: 14px; }
 nav strong { display: block; margin: 14px 0 4px; }
 nav ul { margin: 0; padding: 0; list-style: none; }
 nav li a { display: block; padding: 3px 8px; border-radius: 6px; color: var(--soft); text-decoration: none; }
@@ -40,12 +44,15 @@ nav li a[aria-current] { color: var(--ink); background: var(--code); font-weight
 main { min-width: 0; overflow-wrap: anywhere; }
 h1 { line-height: 1.2; margin-top: 0; }
 img { max-width: 100%; height: auto; border-radius: 8px; }
-pre { overflow-x: auto; padding: 12px 14px; border-radius: 8px; background: var(--code); font-size: 13.5px; line-height: 1.45; }
-code { font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 0.9em; background: var(--code); border-radius: 4px; padding: 1px 4px; }
+pre { overflow-x: auto; padding: 12px 14px; border-radius: 8px; background: var(--code);
+  font-size: 13.5px; line-height: 1.45; }
+code { font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 0.9em;
+  background: var(--code); border-radius: 4px; padding: 1px 4px; }
 pre code { padding: 0; background: none; font-size: inherit; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 14.5px; }
-th, td { padding: 6px 12px 6px 0; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; overflow-wrap: normal; }
+th, td { padding: 6px 12px 6px 0; border-bottom: 1px solid var(--line); text-align: left;
+  vertical-align: top; overflow-wrap: normal; }
 @media (max-width: 820px) {
   #page { display: block; padding: 16px; }
   nav { position: static; max-height: none; margin-bottom: 24px; border-bottom: 1px solid var(--line); }
@@ -106,7 +113,8 @@ class Page:
             at = self.link(found[2])
             return found[1] if at is None else keep(f'<a href="{html.escape(at)}">') + found[1] + keep("</a>")
 
-        text = re.sub(r"`` ?(.+?) ?``|`([^`]+)`", lambda found: keep(f"<code>{html.escape(found[1] or found[2])}</code>"), text)
+        text = re.sub(r"`` ?(.+?) ?``|`([^`]+)`",
+                      lambda found: keep(f"<code>{html.escape(found[1] or found[2])}</code>"), text)
         text = re.sub(r"!\[([^]]*)\]\(([^)]+)\)", lambda found: keep(
             f'<img src="{html.escape(self.link(found[2]) or found[2])}" alt="{html.escape(found[1])}">'), text)
         text = re.sub(r"\[([^]]*)\]\(([^)]+)\)", anchor, text)
@@ -164,7 +172,8 @@ class Page:
                 i += 1
             elif line.startswith("```"):
                 i += 1
-                made.append("<pre><code>" + html.escape("\n".join(take(lambda at: not at.startswith("```"))), quote=False) + "</code></pre>")
+                made.append("<pre><code>" + html.escape("\n".join(take(lambda at: not at.startswith("```"))),
+                                                        quote=False) + "</code></pre>")
                 i += 1
             elif line.startswith("#"):
                 made.append(self.heading(line))
@@ -176,7 +185,8 @@ class Page:
                 made.append("<pre><code>" + html.escape(code.rstrip(), quote=False) + "</code></pre>")
             elif line.startswith("<"):
                 raw = "\n".join(take(lambda at: bool(at.strip())))
-                made.append(re.sub(r'(src|srcset)="([^"]+)"', lambda found: f'{found[1]}="{self.link(found[2]) or found[2]}"', raw))
+                made.append(re.sub(r'(src|srcset)="([^"]+)"',
+                                   lambda found: f'{found[1]}="{self.link(found[2]) or found[2]}"', raw))
             elif re.match(r"([-*]|\d+\.) ", line):
                 made.append(self.items(take(lambda at: bool(at.strip()))))
             else:
@@ -187,12 +197,14 @@ class Page:
     def write(self, contents):
         menu = ""
         for heading, entries in contents:
-            links = "".join(f'<li><a href="{self.relative(at)}"{" aria-current=page" if at == self.address else ""}>{html.escape(title)}</a></li>'
+            links = "".join(f'<li><a href="{self.relative(at)}"{" aria-current=page" if at == self.address else ""}>'
+                            f'{html.escape(title)}</a></li>'
                             for at, title in entries)
             menu += f"<strong>{heading}</strong><ul>{links}</ul>"
         title = self.title if self.title == "Supine" else f"{self.title} - Supine"
         page = (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-                f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{html.escape(title)}</title>\n'
+                f'<meta name="viewport" content="width=device-width, '
+                f'initial-scale=1">\n<title>{html.escape(title)}</title>\n'
                 f'<link rel="icon" href="data:,">\n<style>{STYLE}</style>\n</head>\n<body>\n<div id="page">\n'
                 f'<nav aria-label="Contents">{menu}</nav>\n<main>\n{self.body}\n</main>\n</div>\n</body>\n</html>\n')
         path = os.path.join(site, self.address)
@@ -203,14 +215,16 @@ class Page:
 
 def main():
     order = re.findall(r"\]\(([\w-]+)\.md\)", read("docs/guide/README.md"))
-    present = {name[:-3] for name in os.listdir(os.path.join(source, "docs/guide")) if name.endswith(".md")} - {"README"}
+    present = {name[:-3] for name in os.listdir(os.path.join(source, "docs/guide"))
+               if name.endswith(".md")} - {"README"}
     if set(order) != present:
         sys.exit(f"docs/guide/README.md does not list each page once: {sorted(set(order) ^ present)}")
     pages = [Page("README.md"), Page("docs/guide/README.md")] + [Page(f"docs/guide/{name}.md") for name in order] + \
         [Page(f"docs/{name}.md") for name in OTHERS]
     contents = [("Supine", [("index.html", "Overview"), ("live.html", "Live page")]),
                 ("Guide", [(page.address, page.title) for page in pages if page.address.startswith("guide/")]),
-                ("Reference", [(page.address, page.title) for page in pages[-len(OTHERS):]] + [("reference/index.html", "C headers")])]
+                ("Reference", [(page.address, page.title) for page in pages[-len(OTHERS):]] +
+                 [("reference/index.html", "C headers")])]
     for page in pages:
         page.write(contents)
     for folder in ("docs", "docs/guide"):

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make bases of real lungs with two builds of the program, and compare them tensor by tensor. With each basis, compare the
-surfaces that both programs write in several states byte by byte, and the texts that they print line by line.
+"""Make bases of real lungs with two builds of the program, and compare them tensor by tensor. With each basis, compare
+the surfaces that both programs write in several states byte by byte, and the texts that they print line by line.
 
     python3 compare_bases.py OLD_PROGRAM NEW_PROGRAM DATA_FOLDER
 
 The environment variable ONLY=WORD leaves out the cases whose names do not have this word.
-Print for each case the tensors, the entries of metadata, the surfaces and the lines of output that differ. The exit status
-is 1 if anything differs. DATA_FOLDER has the folders lungs and covid (tests/README.md)."""
+Print for each case the tensors, the entries of metadata, the surfaces and the lines of output that differ. The exit
+status is 1 if anything differs. DATA_FOLDER has the folders lungs and covid (tests/README.md)."""
 import difflib
 import json
 import os
@@ -46,7 +46,8 @@ def read_vertices(path):
 
 
 def write_pairs(path):
-    """Write landmarks on both surfaces, which a breath moves up and to the front, more so near the base and the back."""
+    """Write landmarks on both surfaces, which a breath moves up and to the front, more so near the base and the
+    back."""
     full = np.vstack([read_vertices(file)[::40] for file in LUNGS])
     part = (full - full.min(0)) / np.ptp(full, axis=0)
     rest = full + np.stack([4 * (0.5 - part[:, 0]), -12 * part[:, 1], 28 * (1 - part[:, 2]) ** 1.3], 1)
@@ -67,7 +68,8 @@ def write_fields(path):
     header, body = {}, b""
     for name, tensor in tensors.items():
         numbers = np.ascontiguousarray(tensor, "<f4").tobytes()
-        header[name] = {"dtype": "F32", "shape": list(tensor.shape), "data_offsets": [len(body), len(body) + len(numbers)]}
+        header[name] = {"dtype": "F32", "shape": list(tensor.shape),
+                        "data_offsets": [len(body), len(body) + len(numbers)]}
         body += numbers
     text = json.dumps(header).encode()
     with open(path, "wb") as file:
@@ -136,7 +138,8 @@ def compare_runs(words, folder, places):
     found = [f"{' '.join(words)}: {line}" for line in text_differences(said, says)]
     for name in sorted(wrote.keys() | writes.keys()):
         if wrote.get(name) != writes.get(name):
-            found.append(f"{' '.join(words)}: {len(wrote.get(name, b''))} and {len(writes.get(name, b''))} bytes differ")
+            sizes = f"{len(wrote.get(name, b''))} and {len(writes.get(name, b''))}"
+            found.append(f"{' '.join(words)}: {sizes} bytes differ")
     return found
 
 

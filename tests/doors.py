@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Give each input of each interface (a door) every kind of mistake that such an input can have: the matrix of the
-tables DOORS and MISTAKES. A mistake must be told or refused, as the table of checks (docs/inputs.md) says where it has a row
-for it. The right input beside it must be taken without a word.
+tables DOORS and MISTAKES. A mistake must be told or refused, as the table of checks (docs/inputs.md) says where it has
+a row for it. The right input beside it must be taken without a word.
 
     python3 tests/doors.py [BUILD_FOLDER [DOOR]]
 
-Lungs are those of examples/lungs; another person's are synthetic. To add an input, add one row to DOORS and, if its data
-are of a new type, the mistakes of this type to MISTAKES. Whatever is taken today is listed in KNOWN, by the topic of the
-work that will mend it. The test fails if anything else is taken, and if a known case is mended: then delete its line."""
+Lungs are those of examples/lungs; another person's are synthetic. To add an input, add one row to DOORS and, if its
+data are of a new type, the mistakes of this type to MISTAKES. Whatever is taken today is listed in KNOWN, by the topic
+of the work that will mend it. The test fails if anything else is taken, and if a known case is mended: then delete its
+line."""
 import functools
 import json
 import os
@@ -15,8 +16,8 @@ import shutil
 import subprocess
 import sys
 
-from helpers.verdict import (SOURCE, SUPINE, command, even, folder, javascript, pose_in_c, python, stream, supine, table,
-                             transform, write_ply)
+from helpers.verdict import (SOURCE, SUPINE, command, even, folder, javascript, pose_in_c, python, stream, supine,
+                             table, transform, write_ply)
 import numpy as np
 
 KINDS = ("unit", "axes", "mirror", "person", "swapped", "shifted", "repeated", "range", "finite", "cut")
@@ -311,7 +312,8 @@ ROWS = {("scan", "person"): "person-depth-least", ("scan", "swapped"): "rest-mos
 
 # Mistakes that are taken today, or get different verdicts: door, kind, and the topic of the work that will mend them.
 KNOWN = {
-    **{(door, "shifted"): "belongs" for door in ("command precompute MESH", "Python precompute()", "command solve MESH")},
+    **{(door, "shifted"): "belongs"
+       for door in ("command precompute MESH", "Python precompute()", "command solve MESH")},
     ("command validate --state", "swapped"): "belongs",
     **{(door, kind): "belongs" for door in ("command fit --landmarks", "command validate --landmarks")
        for kind in ("mirror", "person")},

@@ -3,12 +3,13 @@
 
     python3 house.py SOURCE_FOLDER BUILD_FOLDER
 
-Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder may
-include headers of the listed folders, and headers that those folders may include. Check also that files do not depend on
-each other in cycles, that external names have the prefix of their folder, that functions (also those of JavaScript and Python) and
-lines of JavaScript are short and parameters few, that the licences name files that exist, that examples
-have a README and a test, that Python files define the names that they use, that nothing depends on the locale of the host program, that
-distances are printed without digits below rounding, and that tests do not wait for a time."""
+Each row of the table names a folder, says what it contains, and lists folders of earlier rows. The files of a folder
+may include headers of the listed folders, and headers that those folders may include. Check also that files do not
+depend on each other in cycles, that external names have the prefix of their folder, that functions (also those of
+JavaScript and Python) and lines of JavaScript are short and parameters few, that the licences name files that exist,
+that examples have a README and a test, that Python files define the names that they use, that nothing depends on the
+locale of the host program, that distances are printed without digits below rounding, and that tests do not wait for a
+time."""
 import builtins
 import glob
 import os
@@ -23,8 +24,8 @@ source, build = sys.argv[1:3]
 faults = []
 
 PUBLIC = ("runtime/include/supine", "precompute/include/supine")
-# The folders of the public library name functions supine_<object>_<verb>, as installed headers do: there is one object, the
-# library. In every other folder, a function's prefix is supine_<folder>_, for the folder whose header declares it.
+# The folders of the public library name functions supine_<object>_<verb>, as installed headers do: there is one object,
+# the library. In every other folder, a function's prefix is supine_<folder>_, for the folder whose header declares it.
 LIBRARY = ("base", "runtime") + PUBLIC
 
 
@@ -52,7 +53,8 @@ def read_table():
 
 
 def tracked_python():
-    listed = subprocess.run(["git", "-C", source, "ls-files", "*.py"], capture_output=True, text=True, check=False).stdout.split()
+    listed = subprocess.run(["git", "-C", source, "ls-files", "*.py"], capture_output=True, text=True,
+                            check=False).stdout.split()
     return [file for file in listed if os.path.exists(os.path.join(source, file))]
 
 
@@ -63,7 +65,8 @@ def tracked():
              for top in ("base", "sh", "mesh", "precompute", "runtime", "program")
              for folder, _, names in os.walk(os.path.join(source, top))
              for name in names if name.endswith((".c", ".h"))]
-    files = [f for f in (listed or found) if f.split("/")[0] in ("base", "sh", "mesh", "precompute", "runtime", "program")]
+    files = [f for f in (listed or found)
+             if f.split("/")[0] in ("base", "sh", "mesh", "precompute", "runtime", "program")]
     return [f for f in files if os.path.exists(os.path.join(source, f))]
 
 
@@ -123,8 +126,8 @@ def check_include_cycles(files):
 
 
 def objects():
-    """For each object file, yield the source file without its ending, and lists of the external names that it defines and
-    uses."""
+    """For each object file, yield the source file without its ending, and lists of the external names that it defines
+    and uses."""
     sources = {}
     for folder, _, names in os.walk(build):
         match = re.search(r"(.*)/CMakeFiles/supine_[a-z_]+\.dir(.*)$", os.path.relpath(folder, build))
@@ -146,13 +149,15 @@ def declaring_folders(files):
             with open(os.path.join(source, file), encoding="utf-8") as opened:
                 text = without_comments(opened.read())
             for name in re.findall(r"\b(supine_\w+)\(", text) + [
-                    name for names in re.findall(r"^extern ([^;]*);", text, re.M) for name in re.findall(r"\bsupine_\w+", names)]:
+                    name for names in re.findall(r"^extern ([^;]*);", text, re.M)
+                    for name in re.findall(r"\bsupine_\w+", names)]:
                 folder_of.setdefault(name, os.path.dirname(file))
     return folder_of
 
 
 def check_names(folders, files):
-    """Check that external names begin with the prefix of their folder, and that files do not use each other in cycles."""
+    """Check that external names begin with the prefix of their folder, and that files do not use each other in
+    cycles."""
     listed = list(objects())
     home = {name: file for file, defined, _ in listed for name in defined}
     folder_of = declaring_folders(files)
@@ -176,7 +181,8 @@ def check_names(folders, files):
 def check_sizes(files):
     """Check that functions have at most 60 lines and 7 parameters, unless the comment above gives a reason with the
     word "lines" or "parameters"."""
-    begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)(?:\w[\w ]*\n)?[A-Za-z_][^\n;:{}=#]*(?:\n +[^\n;{}=#]*)*\) \{$", re.M)
+    begin = re.compile(r"^(?!(?:typedef|struct|enum|union)\b)"
+                       r"(?:\w[\w ]*\n)?[A-Za-z_][^\n;:{}=#]*(?:\n +[^\n;{}=#]*)*\) \{$", re.M)
     head = re.compile(r"\b(\w+)\(([^;{}]*)\) \{$")
     for file in files:
         if not file.endswith(".c"):
@@ -189,7 +195,8 @@ def check_sizes(files):
             before = text[:found.start()].rstrip()
             comment = before[before.rfind("/*"):] if before.endswith("*/") else ""
             if parameters.count(",") + 1 > 7 and "parameters" not in comment:
-                faults.append(f"{file}: {name} has {parameters.count(',') + 1} parameters: at most 7, or give the reason above it")
+                faults.append(f"{file}: {name} has {parameters.count(',') + 1} parameters: at most 7, or give the "
+                              f"reason above it")
             if lines > 60 and "lines" not in comment:
                 faults.append(f"{file}: {name} has {lines} lines: at most 60, or give the reason above it")
 
@@ -201,7 +208,8 @@ def check_licences():
     dep5 = os.path.join(source, ".reuse", "dep5")
     if os.path.exists(dep5):
         with open(dep5, encoding="utf-8") as opened:
-            named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", opened.read(), re.M) for path in line.split()]
+            named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", opened.read(), re.M)
+                      for path in line.split()]
     for file, path in named:
         if not glob.glob(os.path.join(source, path)):
             faults.append(f"{file}: {path} does not exist")
@@ -221,13 +229,15 @@ def check_opening(files):
         if file.endswith(".c") and file not in OPENING:
             with open(os.path.join(source, file), encoding="utf-8") as text:
                 for name in opening.findall(text.read()):
-                    faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a name from a file")
+                    faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a "
+                                  f"name from a file")
 
 
 # Sources of functions that the JavaScript package calls and that have remedies.
 JAVASCRIPT = ("runtime/basis.c", "runtime/pose.c", "runtime/checks.c", "runtime/state.c", "runtime/expected.c")
 LOCALE_FILES = ("base/number.c", "base/locale.c", "base/locale.h")
-CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
+CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|"
+                  r"(?:f|s)?scanf|strto[dfl]|strtold|ato[fil]|\w*locale\w*|is(?:alnum|alpha|blank|cntrl|digit|"
                   r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
 REAL = re.compile(r"%[-+ #0]*(?:\*|\d+)?(?:\.(?:\*|\d+)?)?[lL]?[aAeEfFgG]")
 LITERAL = re.compile(r'"((?:\\.|[^"\\])*)"')
@@ -277,7 +287,8 @@ def locale_fault(name, parts, function):
 
 
 def check_locale(files):
-    """Check that numbers are parsed and printed, and letters compared, only by functions that ignore the locale of the host."""
+    """Check that numbers are parsed and printed, and letters compared, only by functions that ignore the locale of the
+    host."""
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             text = without_comments(opened.read())
@@ -293,14 +304,16 @@ def check_distances(files):
     """Check that distances in mm which may be rounding errors are printed by supine_text_distance."""
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
-            for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|(?:residual|displacement|distance) %\.\dg mm", opened.read()):
-                faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use supine_text_distance")
+            for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|"
+                                     r"(?:residual|displacement|distance) %\.\dg mm", opened.read()):
+                faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use "
+                              f"supine_text_distance")
 
 
 def check_remedies(files):
-    """Check that only the program names options, that its table of remedies names options that exist, that the tables of
-    the packages have an entry for each remedy, and that no error is set to the message of another without its remedy.
-    Comments may name options, as an option is the shortest name of what it sets."""
+    """Check that only the program names options, that its table of remedies names options that exist, that the tables
+    of the packages have an entry for each remedy, and that no error is set to the message of another without its
+    remedy. Comments may name options, as an option is the shortest name of what it sets."""
     options = set()
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
@@ -309,13 +322,15 @@ def check_remedies(files):
         for literal in LITERAL.finditer(text if not file.startswith("program/") else ""):
             for name in re.findall(r"--[a-z][a-z-]*", literal[1]):
                 line = text.count("\n", 0, literal.start()) + 1
-                faults.append(f"{file}:{line}: {name}: a library's message names the argument, and has a remedy (supine/status.h)")
+                faults.append(f"{file}:{line}: {name}: a library's message names the argument, and has a remedy "
+                              f"(supine/status.h)")
         for call in re.finditer(r"\b(?:supine_error_set|SUPINE_REFUSE_IF|SUPINE_REFUSE_ADVISE)\(", text):
             if file != "base/status.c" and re.search(r"(?:\.|->)message\b(?!\[)", "".join(arguments(text, call.end()))):
                 line = text.count("\n", 0, call.start()) + 1
                 faults.append(f"{file}:{line}: the remedy of the other error is lost: use supine_error_wrap")
     with open(os.path.join(source, "runtime/include/supine/status.h"), encoding="utf-8") as opened:
-        names = re.findall(r"^  SUPINE_REMEDY_([A-Z_]+)[, ]", opened.read().split("typedef enum supine_remedy")[1], re.M)
+        names = re.findall(r"^  SUPINE_REMEDY_([A-Z_]+)[, ]", opened.read().split("typedef enum supine_remedy")[1],
+                           re.M)
     with open(os.path.join(source, "program/options/remedy.c"), encoding="utf-8") as opened:
         for name in set(re.findall(r"--([a-z][a-z-]*)", without_comments(opened.read()))) - options:
             faults.append(f"program/options/remedy.c: no command has an option --{name}")
@@ -336,10 +351,13 @@ def check_waits():
     """Check that tests wait for events, not for a time."""
     for folder, below, names in os.walk(os.path.join(source, "tests")):
         below[:] = [name for name in below if name not in ("node_modules", "bench")]
-        for name in (name for name in names if name.endswith((".c", ".cpp", ".py", ".mjs", ".sh")) and name != "house.py"):
+        for name in (name for name in names if name.endswith((".c", ".cpp", ".py", ".mjs", ".sh"))
+                     and name != "house.py"):
             with open(os.path.join(folder, name), encoding="utf-8") as opened:
-                for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*", opened.read(), re.M):
-                    faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a later message")
+                for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*",
+                                       opened.read(), re.M):
+                    faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a "
+                                  f"later message")
 
 
 def check_python_names(files):
@@ -353,7 +371,8 @@ def check_python_names(files):
 
     def unknown(text, name):
         table = symtable.symtable(text, name, "exec")
-        own = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned() or symbol.is_imported() or symbol.is_namespace()}
+        own = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned() or symbol.is_imported()
+               or symbol.is_namespace()}
         own |= set(re.findall(r"^\s*global (\w+)", text, re.M))
         return sorted(set(used(table)) - own - set(dir(builtins)) - {"__file__", "__path__"})
 
@@ -367,10 +386,14 @@ def check_python_names(files):
 
 
 QUOTED = re.compile(r'"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'')
-CHANGED = r"(?:(?:\+\+|--|&)\s*{0}\b|\b{0}\s*(?:\+\+|--)|\b{0}(?:(?:->|\.)\w+|\[[^]]*\])*\s*(?:[-+*/%&|^]|<<|>>)?=(?!=))"
+CHANGED = (r"(?:(?:\+\+|--|&)\s*{0}\b|\b{0}\s*(?:\+\+|--)|"
+           r"\b{0}(?:(?:->|\.)\w+|\[[^]]*\])*\s*(?:[-+*/%&|^]|<<|>>)?=(?!=))")
 # What a condition of SUPINE_REFUSE_IF may call: functions that answer a question about values, without effects.
-QUESTION = re.compile(r"(?:\w+_)?(?:is|has|same|supports|fits|ends_in|allows|starts|positive|known)(?:_\w+)?|is(?:finite|inf|nan)|S_IS\w+|f(?:abs|max|min|error|eof)|"
-                      r"str(?:n?cmp|len|chr|str)|memchr|\w*_(?:metadata|info|size|distance|status|stride|code|value|named|text|names|sum)|failed|sizeof")
+QUESTION = re.compile(r"(?:\w+_)?(?:is|has|same|supports|fits|ends_in|allows|starts|positive|known)(?:_\w+)?|"
+                      r"is(?:finite|inf|nan)|S_IS\w+|f(?:abs|max|min|error|eof)|"
+                      r"str(?:n?cmp|len|chr|str)|memchr|"
+                      r"\w*_(?:metadata|info|size|distance|status|stride|code|value|named|text|names|sum)|"
+                      r"failed|sizeof")
 
 
 def code_of(text):
@@ -415,8 +438,11 @@ def hidden_if(text, begin):
         names = set(re.findall(r"(?<![.\w>])[A-Za-z_]\w*", part)) | set(re.findall(r"->\s*(\w+)", part))
         passed = re.findall(r"\w\(([^;{}]*)\)", turn)
         changes = any(re.search(CHANGED.format(name), turn) for name in names)
-        reached = any(re.search(r"(?<!\w)%s\b(?!\s*(?:->|\[|\.))" % name, call) for name in re.findall(r"(\w+)\s*(?:->|\[)|\w\((\w+)\)", part) for name in name if name for call in passed)
-        works = [called for called in re.findall(r"(\w+)\(", part) if called != "sizeof" and not QUESTION.fullmatch(called)]
+        reached = any(re.search(r"(?<!\w)%s\b(?!\s*(?:->|\[|\.))" % name, call)
+                      for name in re.findall(r"(\w+)\s*(?:->|\[)|\w\((\w+)\)", part) for name in name if name
+                      for call in passed)
+        works = [called for called in re.findall(r"(\w+)\(", part) if called != "sizeof"
+                 and not QUESTION.fullmatch(called)]
         if not changes and not reached and not works:
             return part.strip()
     return None
@@ -432,7 +458,8 @@ def nested_choice(statement):
                 break
             if letter == "?" and depth == 0:
                 return True
-    return bool(re.search(r"[?:]\s*\([^()]*(?:\([^()]*\)[^()]*)*\?(?:[^()]|\([^()]*\))*:(?:[^()]|\([^()]*\))*\)\s*[;:,)]", statement))
+    return bool(re.search(r"[?:]\s*\([^()]*(?:\([^()]*\)[^()]*)*\?"
+                          r"(?:[^()]|\([^()]*\))*:(?:[^()]|\([^()]*\))*\)\s*[;:,)]", statement))
 
 
 def forms_of(text):
@@ -443,7 +470,8 @@ def forms_of(text):
             yield found.start(), f"the condition of the loop hides an if ({part}): write the if around the loop"
     for found in re.finditer(r"[^;{}]*[;{}]", text):
         if nested_choice(found[0]):
-            yield found.start() + len(found[0]) - len(found[0].lstrip()), "nested ?: are hard to read: use if, switch or a table"
+            yield (found.start() + len(found[0]) - len(found[0].lstrip()),
+                   "nested ?: are hard to read: use if, switch or a table")
     for found in re.finditer(r"\bSUPINE_TRY\(", text):
         if len(split_at(text[found.end():end_of(text, found.end() - 1) - 1], "?")) > 1:
             yield found.start(), "SUPINE_TRY(c ? a : b): write if (c) { SUPINE_TRY(a); }"
@@ -456,7 +484,8 @@ def forms_of(text):
         condition = arguments(text, found.end())[0]
         for called in re.findall(r"\b(\w+)\s*\(", condition):
             if not QUESTION.fullmatch(called):
-                yield found.start(), f"{called} is work inside a condition of SUPINE_REFUSE_IF: call it in a statement before"
+                yield (found.start(), f"{called} is work inside a condition of SUPINE_REFUSE_IF: call it in a "
+                                      f"statement before")
         if re.search(r"!\([^()]*>\s*0\)", condition):
             yield found.start(), "write count == 0 instead of !(count > 0)"
 
@@ -466,12 +495,16 @@ FORMS = (("for (i = 0; i < n && wanted; ++i) { f(i); }", "if (wanted) { for (i =
          ("for (a = 0; p->kind == X && a < 3; ++a) { s[a] += 1; }", "for (a = 0; good && a < 3; ++a) { good = f(a); }"),
          ("for (i = 0; i < n && left > 0; ++i) { f(i); }", "for (i = 0; i < n && left > 0; ++i) { left -= f(i); }"),
          ("for (i = 0; i < n && c->status == 0; ++i) { f(i); }", "for (i = 0; i < n && c->status == 0; ++i) { f(c); }"),
-         ("x = a ? b : c ? d : e;", "x = a ? b : c; y = d ? e : f;"), ("x = a ? (b ? c : d) : e;", "f(a ? b : c, d ? e : g);"),
-         ("for (k = 0; k < 3 && json_array_size(a) == 3; ++k) { f(k); }", "for (k = 0; k < 3 && next(a); ++k) { f(k); }"),
+         ("x = a ? b : c ? d : e;", "x = a ? b : c; y = d ? e : f;"),
+         ("x = a ? (b ? c : d) : e;", "f(a ? b : c, d ? e : g);"),
+         ("for (k = 0; k < 3 && json_array_size(a) == 3; ++k) { f(k); }",
+          "for (k = 0; k < 3 && next(a); ++k) { f(k); }"),
          ("(void)(a != NULL && f(a));", "if (a != NULL) { (void)f(a); }"),
          ("SUPINE_TRY(c ? f() : SUPINE_OK);", "SUPINE_TRY(f(c ? a : b));"), ("*(c ? &a : &b) = x;", "*a = c ? x : y;"),
-         ('SUPINE_REFUSE_IF(fread(p, 1, n, file) != n, error, X, "short");', 'SUPINE_REFUSE_IF(got != n, error, X, "short");'),
-         ('SUPINE_REFUSE_IF(!(count > 0), error, X, "none");', 'SUPINE_REFUSE_IF(!(x > 0.0) || !isfinite(x), error, X, "x");'))
+         ('SUPINE_REFUSE_IF(fread(p, 1, n, file) != n, error, X, "short");',
+          'SUPINE_REFUSE_IF(got != n, error, X, "short");'),
+         ('SUPINE_REFUSE_IF(!(count > 0), error, X, "none");',
+          'SUPINE_REFUSE_IF(!(x > 0.0) || !isfinite(x), error, X, "x");'))
 
 
 def check_forms(files):
@@ -488,7 +521,8 @@ def check_forms(files):
 
 
 def check_examples():
-    """Check that each example has a README that names its files and an existing test, and a row in examples/README.md."""
+    """Check that each example has a README that names its files and an existing test, and a row in
+    examples/README.md."""
     defined = set()
     for path in glob.glob(os.path.join(source, "tests", "*.cmake")) + [os.path.join(source, "tests", "CMakeLists.txt")]:
         with open(path, encoding="utf-8") as opened:

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Give a right and a wrong input of every row of the table of checks (docs/inputs.md) to every interface that takes it, and
-show the verdicts: taken, told (a warning) or refused. All interfaces must give the same one.
+"""Give a right and a wrong input of every row of the table of checks (docs/inputs.md) to every interface that takes it,
+and show the verdicts: taken, told (a warning) or refused. All interfaces must give the same one.
 
     python3 tests/inputs.py [BUILD_FOLDER]
 
-The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target `npm`
-was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
+The folder, build/release by default, must have the program and the shared libraries. JavaScript runs if the target
+`npm` was built and node is installed. To add a row: add it to base/inputs.c, and its cases to CASES below."""
 import ctypes
 import functools
 import os
 import struct
 import sys
 
-from helpers.verdict import SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table, transform, write_ply
+from helpers.verdict import (SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table,
+                             transform, write_ply)
 import numpy as np
 from supine import _library as c
 
@@ -47,7 +48,8 @@ def embedded(z):
     def run(call):
         points(z)
         return call()
-    return {"command": lambda: run(lambda: command("embed", "lungs.safetensors", "points.csv", "-o", "out.safetensors")),
+    return {"command": lambda: run(lambda: command("embed", "lungs.safetensors", "points.csv", "-o",
+                                                   "out.safetensors")),
             "Python": lambda: run(lambda: python(lambda: supine.embed(lungs, "points.csv")))}
 
 
@@ -62,9 +64,10 @@ def located(volume, degrees=0.0):
 
     def by_command():
         with open("seen.csv", "w", encoding="utf-8") as file:
-            file.write("name,x,y,z\n" + "".join(f"{name},{x:.6f},{y:.6f},{z:.6f}\n" for name, (x, y, z) in zip(names, seen)))
-        return command("locate", "lungs.safetensors", "seen.csv", "--points", "inside.safetensors", "--posture", "supine",
-                       "--volume", volume, "-o", "found.csv")
+            file.write("name,x,y,z\n" +
+                       "".join(f"{name},{x:.6f},{y:.6f},{z:.6f}\n" for name, (x, y, z) in zip(names, seen)))
+        return command("locate", "lungs.safetensors", "seen.csv", "--points", "inside.safetensors", "--posture",
+                       "supine", "--volume", volume, "-o", "found.csv")
 
     by_python = lambda: python(lambda: inside.locate(vertices, seen, "supine", volume))
     return {"command": by_command, "C": by_python, "Python": by_python}
@@ -106,8 +109,8 @@ def gained(gain):
 def tidal(ml):
     """A breath of a tidal volume."""
     breathe = lambda: python(lambda: supine.breath([0.0, 1.0], tidal=ml))
-    return {"command": lambda: command("breathe", "lungs.safetensors", "--posture", "supine", "--fps", "1", "--tidal", f"{ml}mL",
-                                       "-o", "out.vtp"), "C": breathe, "Python": breathe}
+    return {"command": lambda: command("breathe", "lungs.safetensors", "--posture", "supine", "--fps", "1", "--tidal",
+                                       f"{ml}mL", "-o", "out.vtp"), "C": breathe, "Python": breathe}
 
 
 def field(posture):
@@ -117,7 +120,8 @@ def field(posture):
 def members(value):
     given = value if isinstance(value, dict) else list(value)
     return {"JavaScript": lambda: javascript(given, "lungs.safetensors"),
-            "Python": lambda: python(lambda: lungs.pose(given.get("gravity", given) if isinstance(given, dict) else given,
+            "Python": lambda: python(lambda: lungs.pose(given.get("gravity", given) if isinstance(given, dict)
+                                                        else given,
                                                         given.get("volume", "") if isinstance(given, dict) else ""))}
 
 
@@ -128,7 +132,8 @@ def write_nrrd(name, voxels, origin=None):
     with open(name, "wb") as file:
         file.write((f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: "
                     + " ".join(map(str, voxels.shape[::-1])) + "\nspace directions: " + " ".join(map(vector, frame[1:]))
-                    + f"\nspace origin: {vector(frame[0] if origin is None else origin)}\nencoding: raw\nendian: little\n\n").encode())
+                    + f"\nspace origin: {vector(frame[0] if origin is None else origin)}\nencoding: raw\nendian: "
+                    f"little\n\n").encode())
         file.write(np.ascontiguousarray(voxels).tobytes())
 
 
@@ -162,7 +167,8 @@ def imaged(voxels, *words, shift=0.0):
     """A CT that moves with the lungs."""
     def run():
         write_nrrd("ct.nrrd", voxels, frame[0] + [0, 0, shift])
-        return command("deform", "grid.safetensors", "--posture", "prone:rest", "--image", "ct.nrrd", *words, "-o", "moved.nrrd")
+        return command("deform", "grid.safetensors", "--posture", "prone:rest", "--image", "ct.nrrd", *words, "-o",
+                       "moved.nrrd")
     return {"command": run}
 
 
@@ -180,7 +186,8 @@ def scanned(scale, left=1.0):
 
 def fitted(rest):
     """Fit a scan at rest, called `rest`, and one at full inflation."""
-    return {"command": lambda: command("fit", "rest.ply", "lungs.ply", "--rest", rest, "--other", "supine:full", "-o", "fitted.json")}
+    return {"command": lambda: command("fit", "rest.ply", "lungs.ply", "--rest", rest, "--other", "supine:full", "-o",
+                                       "fitted.json")}
 
 
 def paired(*words, mismatched=0):
@@ -202,14 +209,19 @@ def write_dae(name, up):
     points_, corners = " ".join(f"{x:.4f}" for x in lungs.vertices.ravel()), " ".join(map(str, lungs.triangles.ravel()))
     n, t = len(lungs.vertices), len(lungs.triangles)
     with open(name, "w", encoding="utf-8") as file:
-        file.write(f'<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>'
-                   f'<unit meter="1"/><up_axis>{up}</up_axis></asset><library_geometries><geometry id="g"><mesh><source id="s">'
-                   f'<float_array id="f" count="{3 * n}">{points_}</float_array><technique_common><accessor source="#f" count="{n}" '
-                   'stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
-                   '</technique_common></source><vertices id="v"><input semantic="POSITION" source="#s"/></vertices><triangles '
-                   f'count="{t}"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles></mesh></geometry>'
-                   '</library_geometries><library_visual_scenes><visual_scene id="c"><node id="n"><instance_geometry url="#g"/>'
-                   '</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#c"/></scene></COLLADA>')
+        file.write(
+            '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+            f'<asset><unit meter="1"/><up_axis>{up}</up_axis></asset>'
+            '<library_geometries><geometry id="g"><mesh><source id="s">'
+            f'<float_array id="f" count="{3 * n}">{points_}</float_array>'
+            f'<technique_common><accessor source="#f" count="{n}" stride="3"><param name="X" type="float"/>'
+            '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+            '<vertices id="v"><input semantic="POSITION" source="#s"/></vertices>'
+            f'<triangles count="{t}"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>'
+            '</mesh></geometry></library_geometries>'
+            '<library_visual_scenes><visual_scene id="c"><node id="n"><instance_geometry url="#g"/></node>'
+            '</visual_scene></library_visual_scenes>'
+            '<scene><instance_visual_scene url="#c"/></scene></COLLADA>')
 
 
 # For each row: a right input, a wrong one, and the verdict on the wrong one.
@@ -226,8 +238,8 @@ CASES = {
     "breath": (breath(500), breath(3500), "told"),
     "gain": (gained(1.0), gained(9.81), "refused"),
     "breath-least": (tidal(500), tidal(0.5), "refused"),
-    "state-members": (members({"gravity": [0, -1, 0], "volume": "rest"}), members({"posture": "prone", "volume": "rest"}),
-                      "refused"),
+    "state-members": (members({"gravity": [0, -1, 0], "volume": "rest"}),
+                      members({"posture": "prone", "volume": "rest"}), "refused"),
     "point-outside": (embedded(-100), embedded(900), "refused"),
     "device-name": (tracked("OK"), tracked("OK", "a_name_of_21_letters_"), "refused"),
     "tracker-invalid": (tracked("OK"), tracked("INVALID"), "told"),
@@ -239,13 +251,16 @@ CASES = {
     "lungs-small": (made("lungs.ply"), made("small.ply", units="mm"), "told"),
     "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
     "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),
-    "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)), lambda: mapped(sides.astype(np.float32) * 1.5), "refused"),
+    "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)),
+                    lambda: mapped(sides.astype(np.float32) * 1.5), "refused"),
     "labels-ratio": (lambda: mapped(sides), lambda: mapped(tumour(8)), "refused"),
     "labels-pieces": (lambda: mapped(sides), lambda: mapped(bed()), "refused"),
-    "labels-sides": (lambda: mapped(sides), lambda: mapped(np.where(sides == 0, 0, 1 + (row_of(2) < row_of(2)[sides > 0].mean() - 2))
+    "labels-sides": (lambda: mapped(sides),
+                     lambda: mapped(np.where(sides == 0, 0, 1 + (row_of(2) < row_of(2)[sides > 0].mean() - 2))
                                                            .astype(np.uint8)), "refused"),
     "labels-order": (lambda: mapped(lobes((1, 2, 3, 4, 5))), lambda: mapped(lobes((4, 5, 1, 2, 3))), "refused"),
-    "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"), "told"),
+    "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"),
+                    "told"),
     "lung-hollow": (lambda: made("lungs.ply"), lambda: made("hollow.ply"), "refused"),
     "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
     "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
@@ -261,15 +276,20 @@ CASES = {
     "rest-most": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest-2500"), "told"),
     "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
     "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
-    "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"), "told"),
-    "patient-volume": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("full.ply", patient="patient.json"), "told"),
+    "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"),
+                    "told"),
+    "patient-volume": (lambda: made("lungs.ply", patient="patient.json"),
+                       lambda: made("full.ply", patient="patient.json"), "told"),
     "surface-turned": (lambda: made("up.dae", axes="LSA"), lambda: made("up.dae"), "refused"),
     "suggestion": (suggested("pron"), suggested("Bauchlage"), "told"),
     "fields-directions": (lambda: simulated(), lambda: simulated(directions=np.eye(3)), "refused"),
     "fields-gap": (lambda: simulated(), lambda: simulated(directions=even(40)[even(40)[:, 1] > 0.05]), "told"),
     "fields-positions": (lambda: simulated(), lambda: simulated(change=lambda u: u + solid), "refused"),
-    "fields-gravity": (lambda: simulated(), lambda: simulated(directions=np.where(np.arange(40) % 2, 1, 2)[:, None] * even(40)), "refused"),
-    "fields-repeated": (lambda: simulated(volumes=3), lambda: simulated(directions=np.concatenate([even(40), even(40)[:5]]), change=partly_reversed), "refused"),
+    "fields-gravity": (lambda: simulated(),
+                       lambda: simulated(directions=np.where(np.arange(40) % 2, 1, 2)[:, None] * even(40)), "refused"),
+    "fields-repeated": (lambda: simulated(volumes=3),
+                        lambda: simulated(directions=np.concatenate([even(40), even(40)[:5]]), change=partly_reversed),
+                        "refused"),
     "fields-copy": (lambda: simulated(), lambda: simulated(change=with_copy), "told"),
     "fields-zero": (lambda: simulated(), lambda: simulated(change=lambda u: with_run(u, 0)), "told"),
     "fields-node": (lambda: simulated(), lambda: simulated(change=with_node), "told"),
@@ -288,7 +308,8 @@ def simulated(directions=None, volumes=1, change=lambda u: u):
     directions = even(40) if directions is None else directions
     place = (solid - solid.mean(axis=0)) / 100
     filling = np.linspace(0, 1, volumes) if volumes > 1 else [0.0]
-    field = lambda g, s: (5 - (place ** 2).sum(1))[:, None] * g + 3 * np.tanh(place @ g)[:, None] * place + 12 * s * place
+    field = lambda g, s: ((5 - (place ** 2).sum(1))[:, None] * g + 3 * np.tanh(place @ g)[:, None] * place +
+                          12 * s * place)
     gravity = np.array([g for g in directions for s in filling])
     displacement = change(np.array([field(g, s) for g in directions for s in filling]))
 
@@ -308,7 +329,8 @@ def simulated_volume(factor):
         supine.save_fields("given.safetensors", solid, gravity, field)
         basis = supine.precompute("lungs.ply", fields="given.safetensors", output="simulated.safetensors")
         return call(basis, f"prone:{factor * sum(basis.volumes(basis.pose('prone'))):.0f}mL")
-    return {"command": lambda: run(lambda _, text: command("deform", "simulated.safetensors", "--posture", text, "-o", "out.ply")),
+    return {"command": lambda: run(lambda _, text: command("deform", "simulated.safetensors", "--posture", text, "-o",
+                                                           "out.ply")),
             "C": lambda: run(lambda basis, text: python(lambda: pose_in_c(basis, text))),
             "Python": lambda: run(lambda basis, text: python(lambda: basis.pose(text))),
             "JavaScript": lambda: run(lambda _, text: javascript(text, "simulated.safetensors"))}

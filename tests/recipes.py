@@ -3,7 +3,8 @@
 
     python3 recipes.py SOURCE_FOLDER
 
-A recipe may only need changes in the files of the program that its text names. The exit status is 77 if numpy is missing."""
+A recipe may only need changes in the files of the program that its text names. The exit status is 77 if numpy is
+missing."""
 import importlib.util
 import os
 import re
@@ -23,7 +24,8 @@ TESTED = ("tests/", "docs/", "CHANGELOG.md", "ARCHITECTURE.md")  # files that ne
 # Recipe: file -> (text that is there, text that replaces it), or None and the text of a new file.
 RECIPES = {
     "a law": {
-        "precompute/physics/model.h": ("LAW(PAPER,", 'LAW(EVEN, "even", 1.05, 0, (0, 0, 0), (6, 2.6, 15, 1, 16, 1.3), 0, '
+        "precompute/physics/model.h": ("LAW(PAPER,",
+                                       'LAW(EVEN, "even", 1.05, 0, (0, 0, 0), (6, 2.6, 15, 1, 16, 1.3), 0, '
                                        '(0, 0, 0), 12, true, false, "the same force everywhere") LAW(PAPER,'),
         "precompute/include/supine/precompute.h": ("  SUPINE_PRECOMPUTE_LAW_PAPER,", "  SUPINE_PRECOMPUTE_LAW_EVEN,\n"
                                                    "  SUPINE_PRECOMPUTE_LAW_PAPER,")},
@@ -44,7 +46,8 @@ void supine_io_save_xyz(const mesh_writer *writer) {
         "mesh/io/CMakeLists.txt": (" save_obj.c ", " save_obj.c save_xyz.c "),
         "mesh/mesh.h": (" NEXT(vtp)", " NEXT(vtp) NEXT(xyz)")},
     "a check of an input": {
-        "runtime/include/supine/inputs.h": ("  SUPINE_INPUT_COUNT ", "  SUPINE_INPUT_PHANTOM_SIZE,\n  SUPINE_INPUT_COUNT "),
+        "runtime/include/supine/inputs.h": ("  SUPINE_INPUT_COUNT ",
+                                            "  SUPINE_INPUT_PHANTOM_SIZE,\n  SUPINE_INPUT_COUNT "),
         "base/inputs.c": ("};\n/* clang-format on */", """  [SUPINE_INPUT_PHANTOM_SIZE] = {
     .name = "phantom-size", .group = "Words", .input = "a number of vertices", .against = "screens",
     .measured = "vertices", .told = NAN, .refused = 40000, .evidence = TEXT("assumed"),
@@ -92,7 +95,8 @@ const supine_command supine_command_sides = {"sides",
 # The recipes of a check and of an output change the same command, `phantom`.
 PHANTOM = [
     ("  double volume;\n", "  double volume;\n  const char *corners;\n"),
-    ("    {.name = NULL}};", """    {"corners", 0, "FILE", "table of the corners to write", SUPINE_FILLS(request, corners),
+    ("    {.name = NULL}};", """\
+    {"corners", 0, "FILE", "table of the corners to write", SUPINE_FILLS(request, corners),
      .file = SUPINE_FILE_OUT, .endings = ".csv"},
     {.name = NULL}};
 
@@ -108,7 +112,8 @@ static supine_status write_corners(const char *path, const supine_mesh *mesh, su
   return supine_output_commit(&output, error);
 }
 """),
-    ("  SUPINE_TRY(supine_lungs_phantom_create(", """  SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_PHANTOM_SIZE, (double)wanted->vertices) ==
+    ("  SUPINE_TRY(supine_lungs_phantom_create(", """\
+  SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_PHANTOM_SIZE, (double)wanted->vertices) ==
                        SUPINE_INPUT_REFUSED,
                    error, SUPINE_ERROR_ARGUMENT, "%zu vertices: %s", wanted->vertices,
                    supine_input_get(SUPINE_INPUT_PHANTOM_SIZE)->remedy);
@@ -117,7 +122,8 @@ static supine_status write_corners(const char *path, const supine_mesh *mesh, su
     SUPINE_TRY(write_corners(wanted->corners, &mesh, error));
   }
   (void)supine_print(stdout"""),
-    ('#include "base/number.h"\n', '#include "base/number.h"\n#include "base/output.h"\n\n#include <supine/inputs.h>\n')]
+    ('#include "base/number.h"\n',
+     '#include "base/number.h"\n#include "base/output.h"\n\n#include <supine/inputs.h>\n')]
 
 
 def check(holds, what):
@@ -178,7 +184,8 @@ def numbers(path):
 def see(supine):
     print("what was added works:", flush=True)
     lung = "examples/lungs/left.obj"
-    text = run(supine, "precompute", lung, "--law", "even", "--band", "5", "--without-normals", "-o", "even.safetensors")
+    text = run(supine, "precompute", lung, "--law", "even", "--band", "5", "--without-normals", "-o",
+               "even.safetensors")
     check("law of displacement: even" in text, "precompute names the law")
     run(supine, "precompute", lung, "--band", "5", "--without-normals", "-o", "deep.safetensors")
     text = run(supine, "info", "even.safetensors", "--json")
@@ -188,39 +195,45 @@ def see(supine):
         for posture in ("supine", "prone"):
             run(supine, "deform", f"{law}.safetensors", "--posture", f"{posture}:1500mL", "-o", f"{law}_{posture}.xyz")
         apart[law] = np.abs(numbers(f"{law}_supine.xyz") - numbers(f"{law}_prone.xyz")).max()
-    print(f"  from supine to prone at one volume: {apart['even']:.4f} mm with the same force everywhere, {apart['deep']:.1f} mm with deep")
-    check(apart["even"] < 0.01 < 1 < apart["deep"], "the new law computes what its own numbers say: turning moves nothing")
+    print(f"  from supine to prone at one volume: {apart['even']:.4f} mm with the same force everywhere, "
+          f"{apart['deep']:.1f} mm with deep")
+    check(apart["even"] < 0.01 < 1 < apart["deep"],
+          "the new law computes what its own numbers say: turning moves nothing")
     shutil.copytree("runtime/python/supine", "py/supine")
     for library in ("runtime/libsupine_runtime.so", "precompute/library/libsupine_precompute.so"):
         shutil.copy(os.path.join("build/release", library), "py/supine")
-    code = f"import supine; supine.precompute({lung!r}, law='even', band=5, without_normals=True, output='py.safetensors')"
+    code = (f"import supine; supine.precompute({lung!r}, law='even', band=5, without_normals=True, "
+            f"output='py.safetensors')")
     os.environ["PYTHONPATH"] = os.path.abspath("py")
     run(sys.executable, "-c", code)
     check('"even"' in run(supine, "info", "py.safetensors", "--json"), "Python takes the law by its name")
     run(supine, "phantom", "--vertices", "1000", "-o", "lungs.xyz", "--corners", "corners.csv")
     run(supine, "phantom", "--vertices", "1000", "-o", "lungs.obj")
     points = numbers("lungs.xyz")
-    check(points.shape[0] > 500 and np.array_equal(points, numbers("lungs.obj")), "the format has the vertices of an OBJ file")
+    check(points.shape[0] > 500 and np.array_equal(points, numbers("lungs.obj")),
+          "the format has the vertices of an OBJ file")
     corners = np.genfromtxt("corners.csv", delimiter=",", skip_header=1)
     check(np.abs(corners - [points.min(0), points.max(0)]).max() < 1e-3, "the output has the corners of the vertices")
     text = run(supine, "phantom", "--corners", "lungs.ply", "-o", "a.ply", status=1)
     check(".csv" in text, "the output has its own ending")
     text = run(supine, "phantom", "--vertices", "50000", "-o", "a.ply", status=1)
-    check("50000 vertices: give fewer" in text and not os.path.exists("a.ply"), "the check refuses, and nothing is written")
+    check("50000 vertices: give fewer" in text and not os.path.exists("a.ply"),
+          "the check refuses, and nothing is written")
     check("sides" in run(supine, "--help") and "how often" in run(supine, "sides", "--help"), "help has the command")
     check(run(supine, "sides", "--times", "2").count("left, right") == 2, "the command runs")
 
 
 with tempfile.TemporaryDirectory() as work:
-    shutil.copytree(SOURCE, os.path.join(work, "copy"), ignore=shutil.ignore_patterns("build", ".git", "node_modules", "__pycache__"))
+    shutil.copytree(SOURCE, os.path.join(work, "copy"),
+                    ignore=shutil.ignore_patterns("build", ".git", "node_modules", "__pycache__"))
     os.chdir(os.path.join(work, "copy"))
     follow("a law", {"precompute/physics/model.h": RECIPES["a law"]["precompute/physics/model.h"],
                      "precompute/include/supine/precompute.h": None})
     launcher = ["-DCMAKE_C_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
     os.environ.update(CCACHE_BASEDIR=os.path.realpath("."), CCACHE_NOHASHDIR="1")
     run("cmake", "--preset", "release", "-DBUILD_TESTING=OFF", *launcher)
-    result = subprocess.run(["cmake", "--build", "build/release", "--target", "supine_precompute"], capture_output=True, text=True,
-                            check=False)
+    result = subprocess.run(["cmake", "--build", "build/release", "--target", "supine_precompute"], capture_output=True,
+                            text=True, check=False)
     check(result.returncode != 0 and "lists the laws in the order of SUPINE_LAWS" in result.stdout,
           "a law that only one of its lists has stops the build")
     replace("precompute/include/supine/precompute.h", *RECIPES["a law"]["precompute/include/supine/precompute.h"])

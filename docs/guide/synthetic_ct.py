@@ -3,8 +3,8 @@
 
     python3 synthetic_ct.py left.obj right.obj
 
-This writes ct.nii.gz, in Hounsfield units, and the folder segmentation with one mask for each lobe, in the files and with
-the names that TotalSegmentator writes. Voxels have sides of 4 mm. The program needs numpy and nibabel."""
+This writes ct.nii.gz, in Hounsfield units, and the folder segmentation with one mask for each lobe, in the files and
+with the names that TotalSegmentator writes. Voxels have sides of 4 mm. The program needs numpy and nibabel."""
 import os
 import sys
 
@@ -51,7 +51,8 @@ y = low[1] + STEP * np.arange(size[1]).reshape(1, -1, 1)
 heights = np.nonzero(inside.any(axis=(0, 1)))[0]
 height = (np.arange(size[2]) - heights[0]) / np.ptp(heights) + np.zeros(size)
 lobes = {"lung_upper_lobe_left": left & (height >= 0.5), "lung_lower_lobe_left": left & (height < 0.5),
-         "lung_upper_lobe_right": right & (height >= 0.6), "lung_middle_lobe_right": right & (height < 0.6) & (height >= 0.4),
+         "lung_upper_lobe_right": right & (height >= 0.6),
+         "lung_middle_lobe_right": right & (height < 0.6) & (height >= 0.4),
          "lung_lower_lobe_right": right & (height < 0.4)}
 
 # Write the images with NIfTI's axes (RAS), like every program that reads them expects.
@@ -62,4 +63,5 @@ for name, where in lobes.items():
     nibabel.save(nibabel.Nifti1Image(where.astype(np.uint8), affine), f"segmentation/{name}.nii.gz")
 density = np.where(inside, -870 + 0.3 * (y - y.mean()), 40)  # denser towards the back
 nibabel.save(nibabel.Nifti1Image(density.astype(np.int16), affine), "ct.nii.gz")
-print(f"ct.nii.gz and 5 masks, {size[0]} x {size[1]} x {size[2]} voxels, {inside.sum() * STEP ** 3 / 1000:.0f} mL of lung")
+print(f"ct.nii.gz and 5 masks, {size[0]} x {size[1]} x {size[2]} voxels, {inside.sum() * STEP ** 3 / 1000:.0f} mL of "
+      f"lung")

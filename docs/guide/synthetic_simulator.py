@@ -3,10 +3,10 @@
 
     python3 synthetic_simulator.py PLAN.csv NAME
 
-The lung hangs on the chest wall, sags along gravity, more in the middle than at its border, is compressed where it lies low,
-and widens as it fills. Files that are written: lung.ply, the surface; points.csv, its vertices; and for each row of the plan
-NAME0.dat, NAME1.dat, ..., the displacements in the format of CalculiX. Files that exist are kept, so that results of a real
-simulator can take their place."""
+The lung hangs on the chest wall, sags along gravity, more in the middle than at its border, is compressed where it lies
+low, and widens as it fills. Files that are written: lung.ply, the surface; points.csv, its vertices; and for each row
+of the plan NAME0.dat, NAME1.dat, ..., the displacements in the format of CalculiX. Files that exist are kept, so that
+results of a real simulator can take their place."""
 import os
 import subprocess
 import sys

@@ -12,7 +12,8 @@ lungs = supine.open(path)
 moved = lungs.deform(lungs.pose(after)) - lungs.deform(lungs.pose(before))  # float32 [N, 3], mm, LPS
 distances = np.linalg.norm(moved, axis=1)
 for name, vertices in lungs.lungs.items():
-    print(f"{name} lung: moves by {distances[vertices].mean():.1f} mm on average, {distances[vertices].max():.1f} mm at most")
+    print(f"{name} lung: moves by {distances[vertices].mean():.1f} mm on average, {distances[vertices].max():.1f} mm "
+          f"at most")
 
 centre = lungs.vertices[lungs.lungs["left"]].mean(axis=0)  # inside the left lung
 nodules = supine.embed(lungs, {"nodule": centre})

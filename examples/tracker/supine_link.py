@@ -39,7 +39,8 @@ def crc64(data, crc=0):
 
 
 def pack(kind, device, content, stamp=0, version=1, number=0):
-    """Return an OpenIGTLink message of type `kind`. Version 2 has an extension before the content, metadata after it."""
+    """Return an OpenIGTLink message of type `kind`. Version 2 has an extension before the content, metadata after
+    it."""
     if version == 2:
         content = EXTENSION.pack(12, 2, 0, number) + content + b"\0\0"
     return HEADER.pack(version, kind.encode(), device.encode(), stamp, len(content),

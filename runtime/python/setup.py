@@ -41,7 +41,8 @@ class Wheel(bdist_wheel):
     the wheel states the oldest glibc that has every symbol that the library needs."""
     def get_tag(self):
         platform = super().get_tag()[2]
-        with open(os.path.join(self.get_finalized_command("build_py").build_lib, "supine/libsupine_runtime.so"), "rb") as library:
+        with open(os.path.join(self.get_finalized_command("build_py").build_lib, "supine/libsupine_runtime.so"),
+                  "rb") as library:
             asked = [int(minor) for minor in re.findall(rb"\0GLIBC_2\.(\d+)", library.read())]
         return "py3", "none", platform.replace("linux_", f"manylinux_2_{max(17, *asked)}_") if asked else platform
 

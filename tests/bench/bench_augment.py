@@ -7,7 +7,8 @@
 The package must find the program and the library. The CT has 65 million voxels of noise and covers the lungs of the
 basis; labels have the same size. Every EVERY states (default 50), print the number of states, the resident memory of
 this process and of the program (VmRSS), the bytes that both wrote to a disk (write_bytes of /proc/PID/io), and the
-processor time of both. The CT is an array of this process and a file in memory that the program maps; each counts it."""
+processor time of both. The CT is an array of this process and a file in memory that the program maps; each counts
+it."""
 import os
 import sys
 import time
@@ -44,4 +45,5 @@ for i, sample in enumerate(supine.augment(lungs, ct, labels=labels, states=state
             pids = ["self", *file.read().split()]
         memory = [numbers(pid, "status", "VmRSS") / 1024 for pid in pids]
         written = sum(numbers(pid, "io", "write_bytes") for pid in pids)
-        print(f"{i},{memory[0]:.0f},{memory[-1]:.0f},{written},{sum(map(seconds, pids)):.1f},{time.time() - start:.0f}", flush=True)
+        print(f"{i},{memory[0]:.0f},{memory[-1]:.0f},{written},{sum(map(seconds, pids)):.1f},{time.time() - start:.0f}",
+              flush=True)

@@ -5,11 +5,11 @@
     bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
                       [--stream path/to/bench_stream]
 
-The old version makes the meshes, and each version its own bases. Print the least wall and processor seconds and the largest memory
-of R rounds for both versions, and the ratios of new to old. Count the bytes in which outputs differ,
-except in VTP. A row is missing if a version lacks the command. The library of a program must be runtime/libsupine_runtime.so in the
-program's folder. --stream adds the median time from sending a pose to receiving its last point, the
-least of R rounds.
+The old version makes the meshes, and each version its own bases. Print the least wall and processor seconds and the
+largest memory of R rounds for both versions, and the ratios of new to old. Count the bytes in which outputs differ,
+except in VTP. A row is missing if a version lacks the command. The library of a program must be
+runtime/libsupine_runtime.so in the program's folder. --stream adds the median time from sending a pose to receiving its
+last point, the least of R rounds.
 
 Versions before 0.3.0 wrote basis files of other formats. Expected differences from version 0.2.0:
 - deform --image, --labels: the factors of a lung's displacement now differ between axes, which changes
@@ -120,8 +120,8 @@ for _ in range(5):
 print(least)
 """
 
-# A Python program that poses a basis in C, and prints the processor milliseconds of the fastest of 50 frames: of positions if
-# its last argument is "positions", of positions and unit normals if it is "lit".
+# A Python program that poses a basis in C, and prints the processor milliseconds of the fastest of 50 frames: of
+# positions if its last argument is "positions", of positions and unit normals if it is "lit".
 POSE = """
 import ctypes, sys, time
 library, basis = ctypes.CDLL(sys.argv[1]), ctypes.c_void_p()

@@ -178,12 +178,14 @@ def print_terms(people, quiet, beta):
         fitted = fit_terms(people, names, beta)
         quiet_left = [left_by(p, names, fitted, beta) for p in quiet]
         print("%-32s %s  %s  %+.1f %%, better in %d; all: %s" % (
-            title, mean_by_kind(left, people), mean_by_kind(quiet_left, quiet), 100 * (np.mean(left) / np.mean(now) - 1),
-            sum(a < b for a, b in zip(left, now)), ", ".join("%s %.2f" % t for t in zip(names, fitted))))
+            title, mean_by_kind(left, people), mean_by_kind(quiet_left, quiet),
+            100 * (np.mean(left) / np.mean(now) - 1), sum(a < b for a, b in zip(left, now)),
+            ", ".join("%s %.2f" % t for t in zip(names, fitted))))
 
 
 def print_outward(people, beta):
-    """Print how far the lungs move outwards as they fill, half of the difference of x between the left and right lung."""
+    """Print how far the lungs move outwards as they fill, half of the difference of x between the left and right
+    lung."""
     print("\noutward motion as lungs fill, mm: seen, by the law; in the medial half seen, by the law")
     for p in people:
         law = p.plain + beta * p.shear
@@ -206,7 +208,8 @@ def patients(options, folder):
     for path in sorted(glob.glob(os.path.join(options.copd or "-", "case*.csv"))):
         to, points = read(path)
         plain, sheared = (program.predict(shear, path[:-4], points) for shear in (0, 0.5))
-        yield usual, True, Patient("copd " + os.path.basename(path)[4:6], points, to - points, plain, 2 * (sheared - plain), False)
+        yield usual, True, Patient("copd " + os.path.basename(path)[4:6], points, to - points, plain,
+                                   2 * (sheared - plain), False)
     for path in sorted(glob.glob(os.path.join(options.quiet or "-", "*.csv"))):
         points, to = read(path)
         plain, shear = (SLOPE_AT_REST * u for u in law_at(points, metadata))
@@ -233,11 +236,13 @@ def main():
         rest = np.mean([b for b, p in zip(betas, full) if p is not patient]) if counts else usual
         row = [rms(patient.moved)] + [v for b in (0, usual, rest) for v in patient.error(b)]
         kinds.setdefault(patient.name[:4], []).append(row)
-        print("%-9s %6.1f" % (patient.name, row[0]) + "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) +
+        print("%-9s %6.1f" % (patient.name, row[0]) +
+              "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) +
               (" | %.2f" % patient.beta if counts else " |"))
     for kind, rows in kinds.items():
         row = np.mean(rows, 0)
-        print("%-9s %6.1f" % (kind + " mean", row[0]) + "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) + " |")
+        print("%-9s %6.1f" % (kind + " mean", row[0]) +
+              "".join(" | %4.0f %% %5.2f mm" % (100 * a, b) for a, b in zip(row[1::2], row[2::2])) + " |")
     print("own beta: mean %.2f, SD %.2f, standard error of the mean %.2f, n %d" % (
         np.mean(betas), np.std(betas, ddof=1), np.std(betas, ddof=1) / len(betas) ** 0.5, len(betas)))
     if options.terms:

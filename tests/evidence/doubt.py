@@ -4,10 +4,11 @@
     doubt.py PROGRAM PACKAGE DATA       PACKAGE: folder with the Python package supine and its library
                                         DATA: folder with caseNN_insp.nii.gz, caseNN_exp.nii.gz and caseNN.csv (DIR-Lab)
 
-Each basis is made of the inhaled scan by the default law, with default options, and deformed to the volume of the exhaled scan.
-Landmarks give the truth, after the best translation, as that between the scans has no meaning. For each person and over all: the
-stated over the true RMS error of distances of two points, by distance, beside that for independent errors; and of the landmarks
-after a rigid registration at six of them, drawn nine times (not within 50 mm of a plane's direction, as in a tree of airways)."""
+Each basis is made of the inhaled scan by the default law, with default options, and deformed to the volume of the
+exhaled scan. Landmarks give the truth, after the best translation, as that between the scans has no meaning. For each
+person and over all: the stated over the true RMS error of distances of two points, by distance, beside that for
+independent errors; and of the landmarks after a rigid registration at six of them, drawn nine times (not within 50 mm
+of a plane's direction, as in a tree of airways)."""
 import glob
 import os
 import subprocess
@@ -36,13 +37,15 @@ def rigid(a, b):
 
 
 def person(case, folder):
-    """Return the sums of true, stated and independently stated squares by distance, and true and stated squares of targets."""
+    """Return the sums of true, stated and independently stated squares by distance, and true and stated squares of
+    targets."""
     marks = np.genfromtxt(f"{case}.csv", delimiter=",", skip_header=1)
     out, inhaled = marks[:, :3], marks[:, 3:]
     scan = nibabel.load(f"{case}_exp.nii.gz")
     volume = (np.asanyarray(scan.dataobj) > 0).sum() * abs(np.linalg.det(scan.affine[:3, :3])) / 1000
     basis = os.path.join(folder, "lungs.safetensors")
-    subprocess.run([program, "precompute", f"{case}_insp.nii.gz", "--held-out", "20", "-o", basis], check=True, capture_output=True)
+    subprocess.run([program, "precompute", f"{case}_insp.nii.gz", "--held-out", "20", "-o", basis], check=True,
+                   capture_output=True)
     inside = supine.embed(supine.open(basis), {f"p{i}": place for i, place in enumerate(inhaled)})
     order = [inside.points[f"p{i}"] for i in range(len(inhaled))]
     mean, covariance = inside.covariance(order, f"supine:{volume:.0f}mL")
@@ -75,8 +78,10 @@ def main():
             distances, true, stated = person(case, folder)
         sums.append(distances)
         all_targets.append((true.mean(), stated.mean()))
-        print(f"{os.path.basename(case)}: distances {' '.join(f'{np.sqrt(s / t):.2f}' for t, s, _ in distances)}; registration at six "
-              f"points: true {rms(true):.1f} mm, stated {rms(stated):.1f} mm, ratio {rms(stated) / rms(true):.2f}", flush=True)
+        print(f"{os.path.basename(case)}: distances {' '.join(f'{np.sqrt(s / t):.2f}' for t, s, _ in distances)}; "
+              f"registration at six "
+              f"points: true {rms(true):.1f} mm, stated {rms(stated):.1f} mm, ratio {rms(stated) / rms(true):.2f}",
+              flush=True)
     total = np.sum(sums, axis=0)
     print("all: distances of", ", ".join(f"{low} to {high} mm {np.sqrt(s / t):.2f} (independent {np.sqrt(x / t):.1f})"
                                          for (low, high), (t, s, x) in zip(BANDS, total)))

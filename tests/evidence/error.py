@@ -63,7 +63,8 @@ class Patient:
 
     def read(self, name="o.csv"):
         rows = list(csv.DictReader(line for line in open(self.folder / name, encoding="utf-8") if line[0] != "#"))
-        return np.array([[float(r[k]) for k in "xyz"] for r in rows]), np.array([float(r["expected_error_mm"]) for r in rows])
+        return (np.array([[float(r[k]) for k in "xyz"] for r in rows]),
+                np.array([float(r["expected_error_mm"]) for r in rows]))
 
     def deform(self, state):
         self.run("deform", "i.safetensors", "--posture", "supine", "--volume", state, "-o", "o.csv")
@@ -86,7 +87,8 @@ def hila(points, lung):
 
 
 def relative(p, state):
-    """Judge errors relative to the hilum. The truth there is the mean of ten landmarks nearest to the hilum of each lung.
+    """Judge errors relative to the hilum. The truth there is the mean of ten landmarks nearest to the hilum of each
+    lung.
 
     Fail if the nearer third of the landmarks is not stated better than the farther third."""
     p.run("deform", "i.safetensors", "--posture", "supine", "--volume", state, "-o", "body.csv")
@@ -99,14 +101,17 @@ def relative(p, state):
         own = np.flatnonzero(lung == side)
         away[own] = np.linalg.norm(p.inhaled[own] - hilum, axis=1)
         there.append(off[own[np.argsort(away[own])[:10]]].mean(0))
-    thirds = [np.sqrt((sigma[which] ** 2).mean()) for which in (away < np.quantile(away, 1 / 3), away > np.quantile(away, 2 / 3))]
+    thirds = [np.sqrt((sigma[which] ** 2).mean())
+              for which in (away < np.quantile(away, 1 / 3), away > np.quantile(away, 2 / 3))]
     if thirds[0] >= thirds[1]:
-        raise RuntimeError("relative to the hilum, near landmarks are stated at %.1f mm, far ones at %.1f" % tuple(thirds))
+        raise RuntimeError("relative to the hilum, near landmarks are stated at %.1f mm, far ones at %.1f" %
+                           tuple(thirds))
     return judge(off - np.mean(there, 0), sigma, np.zeros_like(off), free=False)
 
 
 def along_surface(basis):
-    """Return the share of the squared displacement of the surface, from the scan to full inflation, that is along it."""
+    """Return the share of the squared displacement of the surface, from the scan to full inflation, that is along
+    it."""
     before, after = (np.asarray(basis.deform(basis.pose(state)), float) for state in ("supine:scan", "supine:full"))
     a, b, c = (before[np.asarray(basis.faces).reshape(-1, 4)[:, k]] for k in (1, 2, 3))
     moved = (after - before)[np.asarray(basis.faces).reshape(-1, 4)[:, 1:]].mean(1)
@@ -123,7 +128,8 @@ def print_by_share(share, need):
     lines = [np.polyfit(share[o], log[o], 1) for o in others]
     by_share = [np.polyval(line, at) for line, at in zip(lines, share)]
     constant = [log[o].mean() for o in others]
-    print("surfaces: share of motion along them %s; ratio by this share %s; RMS of its logarithm %.2f, of a constant's %.2f" % (
+    print("surfaces: share of motion along them %s; ratio by this share %s; RMS of its logarithm %.2f, of a "
+          "constant's %.2f" % (
         share.round(2), np.exp((by_share - log) / 2).round(2), *(np.sqrt(np.mean((np.array(x) - log) ** 2)) / 2
                                                                  for x in (by_share, constant))))
 

@@ -57,7 +57,8 @@ ROWS = (
     ("stated error to upright at rest", None, None, "mm", ""),
     ("dome's motion in a breath, prone / supine", None, None, "", "0.75 (hepatic dome, n 9)"),
     ("diaphragm's motion, supine / upright", None, None, "", "above 1 at 15 of 18 points (Takazakura 2004, n 10)"),
-    ("largest displacement, supine to side, rest", None, None, "mm", "up to 40, sliding up to 30 (Alvarez 2023, n 6): no sliding"),
+    ("largest displacement, supine to side, rest", None, None, "mm",
+     "up to 40, sliding up to 30 (Alvarez 2023, n 6): no sliding"),
     ("reversed triangles, at most", 0, 0, "%", ""),
     ("reversed triangles added by the bend", None, 2, "", ""),
 )
@@ -101,8 +102,8 @@ class Lungs:
         return np.cross(b - a, c - a) / 2
 
     def thirds(self, posture, before, after):
-        """Return the volume at positions `before`, and its increase from `before` to `after`, mL, of both lungs together,
-        in the upper, the middle and the lower third of their height."""
+        """Return the volume at positions `before`, and its increase from `before` to `after`, mL, of both lungs
+        together, in the upper, the middle and the lower third of their height."""
         slabs = (Slab * 6)()
         g = (ctypes.c_double * 3)(*self.gravity(posture))
         pointers = [ctypes.c_void_p(np.ascontiguousarray(x).ctypes.data) for x in (before, after)]
@@ -140,7 +141,8 @@ class Lungs:
         out["stated error to upright at rest"] = np.sqrt((sigma ** 2).mean())
         down = self.reference[:, 2] < -0.8 * np.linalg.norm(self.reference, axis=1)
         right = full[self.faces][:, :, 0].mean(1) < (full[:, 0].min() + full[:, 0].max()) / 2
-        moved = {p: np.abs((after[p][0] - rest[p][0])[self.faces].mean(1)[:, 2]) for p in ("supine", "prone", "upright")}
+        moved = {p: np.abs((after[p][0] - rest[p][0])[self.faces].mean(1)[:, 2])
+                 for p in ("supine", "prone", "upright")}
         dome = down & right  # its highest quarter
         dome &= full[self.faces].mean(1)[:, 2] > np.quantile(full[self.faces].mean(1)[dome, 2], 0.75)
         out["dome's motion in a breath, prone / supine"] = moved["prone"][dome].mean() / moved["supine"][dome].mean()
@@ -194,8 +196,8 @@ class Lungs:
 
 
 def lobes(program, path, folder):
-    """Return the change of volume of the lobes of a label map (1, 2: left; 3, 4, 5: right) from supine to upright, %, and
-    the expansion of the upper lobes from rest to full, divided by that of the lower ones."""
+    """Return the change of volume of the lobes of a label map (1, 2: left; 3, 4, 5: right) from supine to upright, %,
+    and the expansion of the upper lobes from rest to full, divided by that of the lower ones."""
     def run(*words):
         return subprocess.run([program, *words], check=True, capture_output=True, text=True).stdout
     out = {}
@@ -248,7 +250,8 @@ def main(arguments):
         columns = {}
         for title, left, right, axes in found:
             basis = str(folder / (title + ".safetensors"))
-            subprocess.run([str(build / "supine"), "precompute", left, right, "-o", basis, *(["--axes", axes] if axes else [])],
+            subprocess.run([str(build / "supine"), "precompute", left, right, "-o", basis,
+                            *(["--axes", axes] if axes else [])],
                            check=True, stdout=subprocess.DEVNULL)
             columns[title] = Lungs(supine, basis).measure()
             for path in glob.glob(os.path.join(os.path.dirname(left), f"lobes_{title[-3:]}.nii.gz")):

@@ -7,10 +7,10 @@
 The simulator is CalculiX (ccx) on a tetrahedral mesh by tetgen, of the left synthetic lung with about VERTICES (default
 1200) vertices. The tissue is linear, or neo-Hookean with large deformation; the pleura slides on springs along its
 normals; the hilum is held. A basis is made of the fields for 32 directions of gravity, and compared with the simulator
-in 10 further directions. Then gravity and volume: a pressure on the pleura for 24 directions and 6 volumes, and 10 states
-in between, stored as modes and as clusters. The commands of docs/guide/simulator.md are run on the results. It prints the
-rows of FIGURES.md. The exit code is 1 if an error is outside the limits below,
-and 77 if a program is missing.
+in 10 further directions. Then gravity and volume: a pressure on the pleura for 24 directions and 6 volumes, and 10
+states in between, stored as modes and as clusters. The commands of docs/guide/simulator.md are run on the results. It
+prints the rows of FIGURES.md. The exit code is 1 if an error is outside the limits below, and 77 if a program is
+missing.
 """
 import concurrent.futures
 import os
@@ -43,7 +43,8 @@ STATED_OVER_FOUND_LINEAR = 0.5, 2  # the error is that of storage
 
 def surface(supine, vertices):
     """Return the vertices and triangles of the left lung of `supine phantom`."""
-    subprocess.run([supine, "phantom", "--vertices", str(2 * vertices), "-o", "lungs.obj"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([supine, "phantom", "--vertices", str(2 * vertices), "-o", "lungs.obj"], check=True,
+                   stdout=subprocess.DEVNULL)
     rows = [line.split() for line in open("lungs.obj", encoding="utf-8")]
     points = np.array([row[1:4] for row in rows if row[:1] == ["v"]], float)
     faces = np.array([[corner.split("/")[0] for corner in row[1:]] for row in rows if row[:1] == ["f"]], int) - 1
@@ -101,7 +102,8 @@ class Deck:
 
     def forces(self, pressure):
         """Return the lines of *CLOAD for a pressure that draws the pleura outwards."""
-        return [f"{i + 1}, {axis + 1}, {pressure * out[axis]:.9g}" for i, out in enumerate(self.outwards) for axis in range(3)]
+        return [f"{i + 1}, {axis + 1}, {pressure * out[axis]:.9g}" for i, out in enumerate(self.outwards)
+                for axis in range(3)]
 
     def write_template(self, path):
         """Write the deck for cohort/calculix.py: with places for gravity and filling."""
@@ -128,7 +130,8 @@ class Deck:
 
 
 def measure(supine, law, points, faces, directions, others):
-    """Print a row for each number of modes; return (error, stated error) by modes, seconds of each program, and the last basis."""
+    """Print a row for each number of modes; return (error, stated error) by modes, seconds of each program, and the
+    last basis."""
     deck = Deck(points, faces, law)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         names = [f"run{i}" for i in range(len(directions) + len(others))]
@@ -176,8 +179,10 @@ def measure_volumes(supine, points, faces, plan, others):
     subprocess.run([sys.executable, job, "lung.inp", *(f"{number:.9g}" for number in plan[3]), "job.csv"], check=True)
     assert np.abs(np.loadtxt("job.csv", delimiter=",") - given[3]).max() < 1e-3, "a job of cohort/calculix.py"
     held = [volume(points + field, faces) for field in fields]
-    print(f"\ngravity and volume: {len(plan)} simulations, {min(held):.0f} to {max(held):.0f} mL, {len(others)} further states\n")
-    print("| stored as | modes | multiplications a vertex | error found | error stated | RMS | largest |\n|---|--:|--:|--:|--:|--:|--:|")
+    print(f"\ngravity and volume: {len(plan)} simulations, {min(held):.0f} to {max(held):.0f} mL, {len(others)} "
+          f"further states\n")
+    print("| stored as | modes | multiplications a vertex | error found | error stated | RMS | largest "
+          "|\n|---|--:|--:|--:|--:|--:|--:|")
     for storage in ("modes", "clusters"):
         basis = supine.precompute(points, faces, fields=(points, plan[:, :3], given), storage=storage)
         found = np.array([basis.deform(basis.pose(tuple(state[:3]), f"{ml:.6f}mL"))
@@ -185,8 +190,10 @@ def measure_volumes(supine, points, faces, plan, others):
         error, stated = np.sqrt((found**2).sum(-1).mean()) / size, float(basis.metadata["error_rms_percent"]) / 100
         errors[storage] = error, stated
         clusters = int(basis.metadata.get("clusters", 0))
-        print(f"| {f'{clusters} clusters' if clusters else storage} | {basis.mode_count} | {15 if clusters else 3 * basis.mode_count + 3} | "
-              f"{100 * error:.2g} % | {100 * stated:.2g} % | {error * size:.2g} mm | {np.linalg.norm(found, axis=-1).max():.2g} mm |")
+        print(f"| {f'{clusters} clusters' if clusters else storage} | {basis.mode_count} | "
+              f"{15 if clusters else 3 * basis.mode_count + 3} | "
+              f"{100 * error:.2g} % | {100 * stated:.2g} % | {error * size:.2g} mm | "
+              f"{np.linalg.norm(found, axis=-1).max():.2g} mm |")
     return errors
 
 
@@ -197,7 +204,8 @@ def compare_law(supine, basis, points, faces):
     for posture, down in (("prone", (0, -1, 0)), ("left", (1, 0, 0)), ("right", (-1, 0, 0))):
         own, other = (lungs.deform(lungs.pose(posture)) - lungs.deform(lungs.pose("supine")) for lungs in (law, basis))
         correlation = np.corrcoef(own.ravel(), other.ravel())[0, 1]
-        moves.append(f"{posture}: correlation {correlation:.2f}, mean along gravity {(own @ down).mean():.1f} mm and {(other @ down).mean():.1f} mm")
+        moves.append(f"{posture}: correlation {correlation:.2f}, mean along gravity {(own @ down).mean():.1f} mm and "
+                     f"{(other @ down).mean():.1f} mm")
     print("\ndefault law at rest beside neo-Hookean, supine to " + "; ".join(moves))
 
 
@@ -205,7 +213,8 @@ def follow_guide(supine, points, faces):
     """Run the commands and programs of docs/guide/simulator.md on the last simulations."""
     page = (pathlib.Path(__file__).resolve().parents[2] / "docs/guide/simulator.md").read_text("utf-8")
     supine._program._write_mesh("lung.ply", points, faces)  # pylint: disable=protected-access
-    np.savetxt("points.csv", points, delimiter=",")  # so that synthetic_simulator.py, which keeps what exists, does nothing
+    # so that synthetic_simulator.py, which keeps what exists, does nothing
+    np.savetxt("points.csv", points, delimiter=",")
     shutil.copy(pathlib.Path(__file__).resolve().parents[2] / "docs/guide/synthetic_simulator.py", ".")
     for language, text in re.findall(r"```(sh|python)\n(.*?)```", page, re.S):
         subprocess.run(["sh", "-euc", text] if language == "sh" else [sys.executable, "-c", text], check=True,
@@ -219,11 +228,11 @@ def follow_guide(supine, points, faces):
 
 
 def take_plan(build, directions, volumes=0):
-    """Return a plan of simulations that the program prints: directions of gravity and, for several volumes, the filling.
-    The numbers of its runs are left out, as the fields keep its order."""
+    """Return a plan of simulations that the program prints: directions of gravity and, for several volumes, the
+    filling. The numbers of its runs are left out, as the fields keep its order."""
     more = ["--volumes", str(volumes)] if volumes else []
-    rows = subprocess.run([build / "supine", "precompute", "--directions", str(directions), *more], check=True, text=True,
-                          stdout=subprocess.PIPE).stdout.split()[1:]
+    rows = subprocess.run([build / "supine", "precompute", "--directions", str(directions), *more], check=True,
+                          text=True, stdout=subprocess.PIPE).stdout.split()[1:]
     return np.array([row.split(",")[:4] for row in rows], float)
 
 
@@ -259,10 +268,12 @@ def main():
         print(f"failed: with 16 modes, the error is {100 * found:.2g} %, and {100 * stated:.2g} % is stated")
     for storage, (found, stated) in over_volume.items():
         if found > MOST_ERROR_OVER_VOLUME or not STATED_OVER_FOUND[0] < stated / found < STATED_OVER_FOUND[1]:
-            wrong = print(f"failed: over volume, {storage}: the error is {100 * found:.2g} %, and {100 * stated:.2g} % is stated") or True
+            wrong = print(f"failed: over volume, {storage}: the error is {100 * found:.2g} %, and {100 * stated:.2g} "
+                          f"% is stated") or True
     for modes, (found, stated) in linear.items():
         if not STATED_OVER_FOUND_LINEAR[0] < stated / found < STATED_OVER_FOUND_LINEAR[1]:
-            wrong = print(f"failed: linear, {modes} modes: the error is {100 * found:.2g} %, and {100 * stated:.2g} % is stated") or True
+            wrong = print(f"failed: linear, {modes} modes: the error is {100 * found:.2g} %, and {100 * stated:.2g} % "
+                          f"is stated") or True
     return int(wrong)
 
 

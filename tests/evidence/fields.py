@@ -4,14 +4,15 @@
 
     tests/evidence/fields.py BUILD [--sets] MAP...
 
-BUILD is the folder of the build, each MAP a label map of a person's lungs at full inflation. The default law stands for the
-simulator: the displacements from full inflation to rest, and from supine to other postures at rest, in several plans of
-directions. Each plan is fitted as `precompute --fields` fits it. Then caps of the sphere are left empty, and the error that
-is found in 150 other directions is divided by the leave-one-out error that would be stated.
+BUILD is the folder of the build, each MAP a label map of a person's lungs at full inflation. The default law stands for
+the simulator: the displacements from full inflation to rest, and from supine to other postures at rest, in several
+plans of directions. Each plan is fitted as `precompute --fields` fits it. Then caps of the sphere are left empty, and
+the error that is found in 150 other directions is divided by the leave-one-out error that would be stated.
 
-Last, or alone with --sets, right sets of fields and the same sets made wrong are measured as the checks of runs, points, units
-and axes measure them: the law of each map (at rest from two origins, and at five volumes), formulas on its surface (nonlinear
-in gravity and volume, one of them with a lung that opens late), and CalculiX where it is installed (tests/evidence/fem.py)."""
+Last, or alone with --sets, right sets of fields and the same sets made wrong are measured as the checks of runs,
+points, units and axes measure them: the law of each map (at rest from two origins, and at five volumes), formulas on
+its surface (nonlinear in gravity and volume, one of them with a lung that opens late), and CalculiX where it is
+installed (tests/evidence/fem.py)."""
 import itertools
 import os
 import pathlib
@@ -37,7 +38,8 @@ def even(count):
 def products(band, g):
     """Products of the coordinates that span the harmonics to a band."""
     return np.array([g[:, 0] ** i * g[:, 1] ** j * g[:, 2] ** (d - i - j)
-                     for d in ({band, band - 1} if band > 0 else {0}) for i in range(d + 1) for j in range(d + 1 - i)]).T
+                     for d in ({band, band - 1} if band > 0 else {0}) for i in range(d + 1)
+                     for j in range(d + 1 - i)]).T
 
 
 # For each band, what makes the products orthonormal over the sphere, as harmonics are.
@@ -82,7 +84,8 @@ def spread(x):
 
 
 def right(basis, step, plans, rng):
-    """Return a row for each plan: left out, of shuffled rows, spread, RMS, largest run, worst run; from full and between postures."""
+    """Return a row for each plan: left out, of shuffled rows, spread, RMS, largest run, worst run; from full and
+    between postures."""
     full, supine = basis.vertices.astype(float)[::step], basis.deform(basis.pose("supine:rest")).astype(float)[::step]
     rows = []
     for origin in (full, supine):
@@ -120,7 +123,8 @@ class Set:
     """Fields of a simulator: plan [M, 4] has a direction and a filling in each row, u [M, N, 3] the displacements."""
 
     def __init__(self, name, points, faces, plan, u):
-        self.name, self.points, self.faces, self.plan, self.u = name, points, faces, np.asarray(plan, float), np.asarray(u, float)
+        self.name, self.points, self.faces = name, points, faces
+        self.plan, self.u = np.asarray(plan, float), np.asarray(u, float)
 
 
 def grid(directions, volumes):
@@ -146,8 +150,8 @@ def formula_sets(points, faces):
         filled = np.where(left, s, 1.15 * s ** 3 / (s ** 3 + 0.15)) * (1 + 0.12 * g[1] ** 3) + 0.06 * g[1] ** 3
         return sag(g, 0) + (14 * filled - 8)[:, None] * place
 
-    plans = [("sags, 24", sag, grid(24, 1)), ("sags, 32 x 4", sag, grid(32, 4)), ("compresses, 24 x 4", compress, grid(24, 4)),
-             ("opens late, 24 x 6", late, grid(24, 6))]
+    plans = [("sags, 24", sag, grid(24, 1)), ("sags, 32 x 4", sag, grid(32, 4)),
+             ("compresses, 24 x 4", compress, grid(24, 4)), ("opens late, 24 x 6", late, grid(24, 6))]
     return [Set(name, points, faces, plan, [law(row[:3], row[3]) for row in plan]) for name, law, plan in plans]
 
 
@@ -155,10 +159,13 @@ def law_sets(package, path):
     """Return the law of a person at rest, from supine and from full inflation, and at five volumes."""
     basis = package.precompute(path, edge=12, held_out=20)
     at = lambda g, volume: basis.deform(basis.pose(tuple(g), volume)).astype(float)
-    faces, supine, full, plan = np.array(basis.triangles), at((0, 1, 0), "scan"), basis.vertices.astype(float), grid(24, 5)
+    faces, supine = np.array(basis.triangles), at((0, 1, 0), "scan")
+    full, plan = basis.vertices.astype(float), grid(24, 5)
     rest, name = np.array([at(g, "rest") for g in even(24)]), pathlib.Path(path).name.split(".")[0]
-    return [Set(f"{name}, rest", supine, faces, grid(24, 1), rest - supine), Set(f"{name}, from full", full, faces, grid(24, 1), rest - full),
-            Set(f"{name}, 24 x 5", supine, faces, plan, [at(row[:3], f"rest+{1500 * row[3]:.0f}") - supine for row in plan])]
+    return [Set(f"{name}, rest", supine, faces, grid(24, 1), rest - supine),
+            Set(f"{name}, from full", full, faces, grid(24, 1), rest - full),
+            Set(f"{name}, 24 x 5", supine, faces, plan,
+                [at(row[:3], f"rest+{1500 * row[3]:.0f}") - supine for row in plan])]
 
 
 def calculix_sets(build, vertices=800):
@@ -184,7 +191,8 @@ def gravity_part(given):
 
 
 def frame_gain(given):
-    """Motion along gravity that other axes of gravity gain, summed over three directions / RMS of what gravity changes."""
+    """Motion along gravity that other axes of gravity gain, summed over three directions / RMS of what gravity
+    changes."""
     moved = gravity_part(given)
     linear = 3 * np.einsum("mi,mj->ij", moved.mean(1), given.plan[:, :3]) / len(moved)
     sums = [sum(sign * linear[i, j] for i, (j, sign) in enumerate(zip(order, signs)))
@@ -193,7 +201,8 @@ def frame_gain(given):
 
 
 def stray(given):
-    """Distance of a vertex from the mean displacement of its neighbours / largest such distance of these, and above a tenth of the RMS."""
+    """Distance of a vertex from the mean displacement of its neighbours / largest such distance of these, and above a
+    tenth of the RMS."""
     edges = np.concatenate([given.faces[:, [i, j]] for i, j in itertools.permutations(range(3), 2)])
     count, worst = np.bincount(edges[:, 0], minlength=len(given.points))[:, None].clip(1), 0
     least = 0.1 * np.sqrt((given.u ** 2).sum(2).mean())
@@ -208,7 +217,8 @@ def stray(given):
 
 
 def best_fit(plan, u, kept):
-    """Return band, order and the leave-one-out errors of the runs `kept`, of the fit with the least of them; volumes as `fill`."""
+    """Return band, order and the leave-one-out errors of the runs `kept`, of the fit with the least of them; volumes as
+    `fill`."""
     best = None
     for order in range(1 if np.ptp(plan[:, 3]) > 0 else 0, min(4, len(np.unique(plan[kept, 3])) - 1) + 1):
         for band in range(6):
@@ -230,7 +240,8 @@ def fit_terms(plan, band, order):
 
 
 def worst_run(given):
-    """Largest error of three runs that were taken out, predicted from the others / median error of these, above a twentieth of the RMS."""
+    """Largest error of three runs that were taken out, predicted from the others / median error of these, above a
+    twentieth of the RMS."""
     u = given.u[:, ::max(1, len(given.points) // POINTS)].reshape(len(given.u), -1)
     kept, out, size = np.arange(len(u)), [], np.sqrt((u ** 2).sum(1).mean())
     band, order, error = best_fit(given.plan, u, kept)
@@ -255,17 +266,20 @@ def made_wrong(given):
     yield change("x mirrored", given.plan * [-1, 1, 1, 1])
     yield edit("a run of zeros", lambda u: u.__setitem__(row, 0))
     yield edit("two runs exchanged", lambda u: u.__setitem__([row, row + 5], u[[row + 5, row]]))
-    yield edit("a point 60 mm off", lambda u: u.__setitem__((3, len(given.points) // 3, 0), u[3, len(given.points) // 3, 0] + 60))
+    yield edit("a point 60 mm off",
+               lambda u: u.__setitem__((3, len(given.points) // 3, 0), u[3, len(given.points) // 3, 0] + 60))
 
 
 def measure_sets(package, build, paths):
     sets = sum((law_sets(package, path) for path in paths), [])
     sets += formula_sets(sets[0].points, sets[0].faces) + calculix_sets(build)
-    print(f"\n{'set':28} {'runs':>4} {'what is wrong':20} {'gravity, mm':>11} {'axes':>5} {'point':>6} {'run':>6} {'run, large':>10}")
+    print(f"\n{'set':28} {'runs':>4} {'what is wrong':20} {'gravity, mm':>11} {'axes':>5} {'point':>6} {'run':>6} "
+          f"{'run, large':>10}")
     for given in sets:
         for wrong, now in [("", given), *made_wrong(given)]:
             moved, run = np.sqrt((gravity_part(now) ** 2).sum(2).mean()), worst_run(now)
-            print(f"{given.name:28} {len(given.u):4} {wrong:20} {moved:11.1f} {frame_gain(now):5.2f} {stray(now):6.1f} {run[0]:6.1f} {run[1]:10.1f}",
+            print(f"{given.name:28} {len(given.u):4} {wrong:20} {moved:11.1f} {frame_gain(now):5.2f} "
+                  f"{stray(now):6.1f} {run[0]:6.1f} {run[1]:10.1f}",
                   flush=True)
 
 
@@ -295,10 +309,12 @@ def measure(package, paths):
         measured.append(right(basis, step, plans.values(), rng))
         empty += caps(basis, step)
     measured = np.array(measured).reshape(len(measured), 2, len(plans), 6)
-    print(f"{'directions':14} {'gap':>4} {'condition':>9} {'left out':>8} {'shuffled':>8} {'spread':>6} {'RMS, mm':>7} {'largest':>7} {'worst':>6}")
+    print(f"{'directions':14} {'gap':>4} {'condition':>9} {'left out':>8} {'shuffled':>8} {'spread':>6} "
+          f"{'RMS, mm':>7} {'largest':>7} {'worst':>6}")
     for i, (name, g) in enumerate(plans.items()):
         m, least = measured[:, :, i].max((0, 1)), measured[:, :, i].min((0, 1))
-        print(f"{name:14} {gap(g):4.0f} {condition(g):9.1f} {m[0]:8.2f} {least[1]:8.2f} {m[2]:6.2f} {least[3]:7.1f} {m[4]:7.2f} {m[5]:6.1f}")
+        print(f"{name:14} {gap(g):4.0f} {condition(g):9.1f} {m[0]:8.2f} {least[1]:8.2f} {m[2]:6.2f} {least[3]:7.1f} "
+              f"{m[4]:7.2f} {m[5]:6.1f}")
     print("\ncap left empty, degrees; gap; condition; found error, median and most; found / stated, median and most")
     for angle in sorted({row[0] for row in empty}):
         r = np.array([row for row in empty if row[0] == angle])

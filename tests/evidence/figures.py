@@ -6,8 +6,8 @@
 
 BUILD is the folder of the build. --landmarks: caseNNN*.csv with points of two states, inhaled then exhaled, for fits of
 a patient's own law. --copd: caseNN.csv, exhaled then inhaled, with label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz,
-for the applied force (IV-B.3 of the paper). --pairs: NAME_left.* and NAME_right.*, for the errors of the normals. Volumes
-of landmarks alone are unknown: 2500 and 5500 mL are given, which change neither the errors nor the force.
+for the applied force (IV-B.3 of the paper). --pairs: NAME_left.* and NAME_right.*, for the errors of the normals.
+Volumes of landmarks alone are unknown: 2500 and 5500 mL are given, which change neither the errors nor the force.
 """
 import argparse
 import glob
@@ -39,7 +39,8 @@ class Program:
 
 
 def print_fits(program, folder):
-    print("| case | translation | affine | `deep` | `deep` + kriging | expected | within the 95 % band |\n|---|---|---|---|---|---|---|")
+    print("| case | translation | affine | `deep` | `deep` + kriging | expected | within the 95 % band "
+          "|\n|---|---|---|---|---|---|---|")
     rows = []
     for path in sorted(glob.glob(os.path.join(folder, "*.csv"))):
         report = program.fit_landmarks(path)
@@ -51,7 +52,8 @@ def print_fits(program, folder):
 
 
 def print_forces(program, folder):
-    print("\n| case | correlation with the height: landmarks | surfaces | gain / base: landmarks | surfaces | left by (18): landmarks | surfaces |\n"
+    print("\n| case | correlation with the height: landmarks | surfaces | gain / base: landmarks | surfaces | left by "
+          "(18): landmarks | surfaces |\n"
           "|---|---|---|---|---|---|---|")
     for path in sorted(glob.glob(os.path.join(folder, "case*.csv"))):
         scans = [path[:-4] + end for end in ("_exp.nii.gz", "_insp.nii.gz")]

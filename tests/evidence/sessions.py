@@ -5,9 +5,9 @@
     tests/evidence/sessions.py HEADER SESSIONS
 
 HEADER is runtime/include/supine/locate.h, which has the term SUPINE_ANOTHER_DAY_MM. SESSIONS holds NAME.csv with
-matched landmarks of the first and the second scan: x,y,z,to_x,to_y,to_z, mm, LPS. For each person it prints the RMS distance of
-the landmarks after the rigid motion that fits best, the same after a motion and one scale, which stands for another
-volume, the share of the square that is along z, and stated / true. Exit code 77: no data."""
+matched landmarks of the first and the second scan: x,y,z,to_x,to_y,to_z, mm, LPS. For each person it prints the RMS
+distance of the landmarks after the rigid motion that fits best, the same after a motion and one scale, which stands for
+another volume, the share of the square that is along z, and stated / true. Exit code 77: no data."""
 import csv
 import pathlib
 import re

@@ -98,15 +98,16 @@ LIMIT = 60  # time limit of a command, s
 class Trial:
     def __init__(self, program, library, folder):
         self.program, self.folder = program, folder
-        self.library = library and shutil.copy(library, folder / "libfaults.so")  # LD_PRELOAD needs a path without spaces
+        # LD_PRELOAD needs a path without spaces
+        self.library = library and shutil.copy(library, folder / "libfaults.so")
         self.out = folder / "out"
         self.report = folder / "report"
         self.environment = {"SUPINE_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ,
                             "LIBGL_ALWAYS_SOFTWARE": "1", "FAULT_REPORT": str(self.report)}
 
     def run(self, arguments, kind=None, nth=None):
-        """Run the program. If `nth` is given, its nth call of this kind fails. Return the exit code, stdout, stderr, and the
-        numbers of calls, of failed calls and of blocks not freed."""
+        """Run the program. If `nth` is given, its nth call of this kind fails. Return the exit code, stdout, stderr,
+        and the numbers of calls, of failed calls and of blocks not freed."""
         shutil.rmtree(self.out, ignore_errors=True)
         self.out.mkdir()
         self.report.unlink(missing_ok=True)
@@ -254,7 +255,8 @@ def main():
                         print("WRONG " + wrong[-1], flush=True)
                 faults[kind] += tried
                 print(f"{kind:6} {tried:5} of {count:5} failed, {found} wrong: {line}", flush=True)
-    tried = [f"{count} {kind} faults" for kind, count in faults.items()] if library else ["each command once, without faults"]
+    tried = [f"{count} {kind} faults"
+             for kind, count in faults.items()] if library else ["each command once, without faults"]
     print(f"{', '.join(tried)}: {len(wrong)} wrong")
     sys.exit(1 if wrong else 0)
 

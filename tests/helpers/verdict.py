@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ask the interfaces of the program for their verdict on an input: taken, told (a warning) or refused. Tests that import
-this module run in a new folder, with the Python package of the build folder that is their first argument (default
-build/release)."""
+"""Ask the interfaces of the program for their verdict on an input: taken, told (a warning) or refused. Tests that
+import this module run in a new folder, with the Python package of the build folder that is their first argument
+(default build/release)."""
 import ctypes
 import importlib.util
 import json

@@ -5,12 +5,12 @@
     mutate.py named [PATTERN]          the mutants in named.txt, or those whose title matches PATTERN
     mutate.py random [COUNT] [SEED]    COUNT (default 100) random mutants of the code in FOLDERS
 
-A mutant is the code of the last commit with one change, made in a copy in build/mutation. The mutant is killed if a test
-fails or exceeds its time limit. A mutant that does not compile does not count. For a random mutant, only tests that
-reach the changed line are run, quick ones first, until one fails or they have taken ENOUGH seconds. To find the tests
-that reach a line, each test runs once alone in an instrumented build; the results are kept for other seeds of the same
-commit. Tests that fail in the instrumented build, take longer than SLOW seconds there or are listed in LEFT_OUT are not
-used. Because some tests are not used, the number of survivors is an upper bound. The environment variable
+A mutant is the code of the last commit with one change, made in a copy in build/mutation. The mutant is killed if a
+test fails or exceeds its time limit. A mutant that does not compile does not count. For a random mutant, only tests
+that reach the changed line are run, quick ones first, until one fails or they have taken ENOUGH seconds. To find the
+tests that reach a line, each test runs once alone in an instrumented build; the results are kept for other seeds of the
+same commit. Tests that fail in the instrumented build, take longer than SLOW seconds there or are listed in LEFT_OUT
+are not used. Because some tests are not used, the number of survivors is an upper bound. The environment variable
 SUPINE_CMAKE_OPTIONS adds options for cmake, such as -DSUPINE_LUNGS=FOLDER.
 """
 import json
@@ -36,7 +36,8 @@ FOLDERS = ("base", "sh", "mesh", "precompute", "runtime", "program")
 QUICK, SLOW = 2.0, 320.0  # time in the instrumented build, s, up to which a test runs first, and is used at all
 ENOUGH = 240.0  # longest total time of the tests of one mutant, s
 JOBS = str(len(os.sched_getaffinity(0)))  # number of processors
-LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"  # tests that read the sources, rebuild the project, or accept any input
+# tests that read the sources, rebuild the project, or accept any input
+LEFT_OUT = r"house|readme_example|install|windows|fuzz_.*"
 
 
 def run(*command, cwd=BUILD, **environment):
@@ -162,7 +163,8 @@ def random_ones(count, seed):
         line = lines[number]
         lines[number] = line[:match.start()] + match.expand(chosen.choice(instead)) + line[match.end():]
         path = str(file.relative_to(COPY))
-        # If gcov does not count this line, use the tests that reach the file. If gcov does not count the file, use all tests.
+        # If gcov does not count this line, use the tests that reach the file. If gcov does not count the file, use all
+        # tests.
         tests = reached.get((path, number + 1), reached.get((path, 0), sorted(took, key=took.get)))
         used = list(accumulate(took[t] for t in tests))
         tests = [t for t, so_far in zip(tests, used) if so_far <= ENOUGH] or tests[:1]
@@ -179,8 +181,8 @@ def random_ones(count, seed):
 
 
 def measured():
-    """Return the time of each test, s, and for each (file, line) the tests that reach it. Line 0 stands for any line of the
-    file."""
+    """Return the time of each test, s, and for each (file, line) the tests that reach it. Line 0 stands for any line of
+    the file."""
     covered = FOLDER / "covered"
     configure(covered, "-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_C_FLAGS_DEBUG=-Og", "-DSUPINE_COVERAGE=ON")
     if not build(covered):
@@ -204,8 +206,8 @@ def measured():
 
 
 def lines_reached(name, covered, kept):
-    """Run a test of the instrumented build, or read its result from `kept` if it has run before. Return three things: its
-    time, s (infinite if it fails), the list of (file, line) that gcov counts, and the list of those that the test
+    """Run a test of the instrumented build, or read its result from `kept` if it has run before. Return three things:
+    its time, s (infinite if it fails), the list of (file, line) that gcov counts, and the list of those that the test
     reached. Line 0 stands for any line of the file."""
     kept, counts = kept / f"{name}.json", FOLDER / "counts" / name
     if kept.exists():

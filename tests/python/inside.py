@@ -36,10 +36,12 @@ n, k = lungs.vertex_count, lungs.mode_count
 assert lungs.has_volume and lungs.has_normals and list(lungs.lungs) == ["left", "right"]
 
 # Arrays of a basis are read-only views, not copies. The basis stays open while one of its arrays exists.
-for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32), (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
+for array, shape, dtype in ((lungs.vertices, (n, 3), np.float32),
+                            (lungs.triangles, (lungs.triangle_count, 3), np.uint32),
                             (lungs.coefficients, (n, k), np.float32), (lungs.direction, (n, 3), np.float32),
-                            (lungs.modes, (k, (lungs.band + 1) ** 2, 1), np.float64), (lungs.bounds, (2, 2, 3), np.float32),
-                            (lungs.tensor("lung"), (n,), np.uint8), (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int8)):
+                            (lungs.modes, (k, (lungs.band + 1) ** 2, 1), np.float64),
+                            (lungs.bounds, (2, 2, 3), np.float32), (lungs.tensor("lung"), (n,), np.uint8),
+                            (lungs.tensor("normals"), lungs.tensor("normals").shape, np.int8)):
     assert array.shape == shape and array.dtype == dtype and not array.flags.owndata
     assert not array.flags.writeable and array.flags.c_contiguous
 assert lungs.tensor("vertices").ctypes.data == lungs.vertices.ctypes.data
@@ -63,7 +65,8 @@ assert np.abs(mean[1] - lungs.deform(lungs.pose("prone:rest"))[[0, 5, n - 1]]).m
 other = lungs.covariance([0], "supine:rest", another_day=True)[1]
 assert abs(other[0, 0, 0, 0, 0, 0] - square[0, 0] - 4 / 9 * 6.2 ** 2) < 1e-9
 drawn = lungs.samples("supine:rest", 2, seed=3)
-assert drawn.shape == (2, n, 3) and (drawn[0] != drawn[1]).any() and (drawn == lungs.samples("supine:rest", 2, seed=3)).all()
+assert drawn.shape == (2, n, 3) and (drawn[0] != drawn[1]).any()
+assert (drawn == lungs.samples("supine:rest", 2, seed=3)).all()
 left = lungs.registered_error("prone:rest", [0, n // 4, n // 2, n - 1])
 assert left.shape == (n,) and (left > 0).all() and left[0] < lungs.expected_error("prone:rest")[0] * (4 / 3) ** .5
 refused(supine.ArgumentError, "2 points of the frame", lungs.registered_error, "prone", [0, 1])
@@ -73,10 +76,12 @@ for name, shape in (("clusters", (5,)), ("simulated", (2, 2))):
     other = supine.open(f"{name}.safetensors", storage="exact")
     asked = other.pose("prone", "scan+100")
     weights, gains = other.weights(asked), other.gains(asked)
-    assert weights.shape == shape and other.coefficients.shape == (60, 3, shape[-1]) and other.order == len(shape[1:]) * 2
+    assert weights.shape == shape and other.coefficients.shape == (60, 3, shape[-1])
+    assert other.order == len(shape[1:]) * 2
     expected = other.vertices.astype(float)
     for i, part in enumerate(other.lungs.values()):
-        expected[part] += gains[i] * (other.coefficients[part].astype(float) @ (weights if weights.ndim == 1 else weights[i]))
+        own = weights if weights.ndim == 1 else weights[i]
+        expected[part] += gains[i] * (other.coefficients[part].astype(float) @ own)
     assert np.abs(other.deform(asked) - expected).max() < 1e-3
 
 # Results have the same bits as in C, for a basis from a file, for a basis from memory, and for ranges of vertices.
@@ -184,7 +189,8 @@ try:
 except ValueError:
     pass
 
-# Lungs are located from observed points: a wrong point is reported, a rotation is found, and invalid points are refused.
+# Lungs are located from observed points: a wrong point is reported, a rotation is found, and invalid points are
+# refused.
 seen = list(range(0, n, n // 20))
 truth = lungs.deform(lungs.pose("left:rest+300"))
 turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
@@ -256,7 +262,8 @@ lobes = (x // 8).astype(np.uint8)
 assert set(np.unique(grid.warp(lobes, "prone:rest", **frame, labels=True))) <= set(np.unique(lobes))
 back = grid.warp(moved[0], "scan", **frame, since="prone:rest")
 inner = abs(back.astype(int) - image)[size[2] // 3:-size[2] // 3, size[1] // 3:-size[1] // 3]
-assert np.median(inner) < 20 < np.median(abs(moved[0].astype(int) - image)[size[2] // 3:-size[2] // 3]), np.median(inner)
+assert np.median(inner) < 20, np.median(inner)
+assert 20 < np.median(abs(moved[0].astype(int) - image)[size[2] // 3:-size[2] // 3])
 refused(supine.FormatError, "no grid", lungs.warp, image, "prone:rest", **frame)
 refused(ValueError, "[z, y, x]", grid.warp, image[0], "prone:rest", **frame)
 refused(ValueError, "uint8", grid.warp, image.astype(np.int64), "prone:rest", **frame)
@@ -286,8 +293,10 @@ refused(supine.MeshError, f"surface 1: face 0 names vertex {n + 3}", supine.prec
         lungs.triangles[:1].astype(np.int64) * 0 + n + 3)
 refused(supine.MeshError, "names vertex", supine.precompute, lungs.vertices, lungs.triangles.astype(np.int64) + 2**32)
 refused(supine.ArgumentError, "no option 'colour'", supine.precompute, lungs.vertices, lungs.triangles, colour="red")
-refused(supine.ArgumentError, "or leave soften out", supine.precompute, lungs.vertices, lungs.triangles, law="paper", soften=1)
-refused(supine.ArgumentError, "needs a reference", supine.precompute, lungs.vertices, lungs.triangles, scanned="supine:500")
+refused(supine.ArgumentError, "or leave soften out", supine.precompute, lungs.vertices, lungs.triangles, law="paper",
+        soften=1)
+refused(supine.ArgumentError, "needs a reference", supine.precompute, lungs.vertices, lungs.triangles,
+        scanned="supine:500")
 refused(supine.ReadError, "nowhere.ply: cannot read", supine.precompute, "nowhere.ply")
 refused(ValueError, "[N, 3]", supine.precompute, lungs.vertices[:, :2], lungs.triangles)
 refused(ValueError, "integers", supine.precompute, lungs.vertices, lungs.vertices)
@@ -308,7 +317,8 @@ supine.save_fields(path + ".fields", *fields)
 from_file = supine.precompute(lungs.vertices, lungs.triangles, fields=path + ".fields", scanned="supine")
 assert (from_file.coefficients == given.coefficients).all()
 refused(ValueError, "displacement [M, P, 3]", supine.save_fields, path + ".fields", points[1:], *fields[1:])
-refused(supine.MeshError, "fields: the vertex at", supine.precompute, lungs.vertices + 1, lungs.triangles, fields=fields)
+refused(supine.MeshError, "fields: the vertex at", supine.precompute, lungs.vertices + 1, lungs.triangles,
+        fields=fields)
 
 
 def interrupt(part):
@@ -321,8 +331,8 @@ try:
 except KeyboardInterrupt:
     assert not os.path.exists(path + ".stopped")
 
-# Points with or without names, a mesh and a grid can be embedded into a basis. The basis can be made from a file or from
-# arrays. A point on the surface moves with the surface.
+# Points with or without names, a mesh and a grid can be embedded into a basis. The basis can be made from a file or
+# from arrays. A point on the surface moves with the surface.
 place = lungs.vertices[7].astype(float)
 for basis in (lungs, made):
     inside = supine.embed(basis, {"on, the surface": place, "other": (-80, -120, -90)})
@@ -334,12 +344,15 @@ wanted = parts.targets("left", since="supine:rest")
 table = path + ".csv"
 with open(path + ".parts", "wb") as file:
     file.write(parts._owner.source)
-subprocess.run(["supine", "deform", file.name, "--posture", "left", "--from", "supine:rest", "-o", table], check=True, stdout=subprocess.DEVNULL)
+subprocess.run(["supine", "deform", file.name, "--posture", "left", "--from", "supine:rest", "-o", table], check=True,
+               stdout=subprocess.DEVNULL)
 with open(table) as file:
     rows = [line.split(",") for line in file.read().split("\n")[2:-1]]
 assert len(rows) == len(wanted) == 2 and all(t.mm > 0 and not t.anatomy for t in wanted)
 for row, t in zip(rows, wanted):
-    assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float), [*t.at, *t.move, t.mm, t.moved_error, t.expected_error, t.another_day_error], atol=2e-3), (row, t)
+    assert row[:2] == [t.name, t.lung] and np.allclose(np.array(row[2:], float),
+                                                       [*t.at, *t.move, t.mm, t.moved_error, t.expected_error,
+                                                        t.another_day_error], atol=2e-3), (row, t)
 refused(supine.ArgumentError, "no structures", lungs.targets, "left")
 assert supine.embed(made, place).vertex_count == 1
 parts = supine.embed(made, (0.9 * lungs.vertices, lungs.triangles), np.array([place]))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare the output of a session with its golden file: same_output.py GOLDEN OUTPUT.
 
-Numbers differ slightly between processors, so that rounding may go either way: numbers with decimals may differ by one in
-the last digit that is printed. If a command is piped through `rounded DIGITS LEAST`, which keeps that many significant
-digits, they may differ by one in the last of these, or by LEAST. The width of a column follows its numbers, so that runs
-of spaces count as one space. All other output must be identical."""
+Numbers differ slightly between processors, so that rounding may go either way: numbers with decimals may differ by one
+in the last digit that is printed. If a command is piped through `rounded DIGITS LEAST`, which keeps that many
+significant digits, they may differ by one in the last of these, or by LEAST. The width of a column follows its numbers,
+so that runs of spaces count as one space. All other output must be identical."""
 import difflib
 import math
 import re

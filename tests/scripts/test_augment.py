@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Test supine.augment and supine.Deform on synthetic lungs: test_augment.py SOURCE_FOLDER PROGRAM LIBRARY
 
-Samples equal what `warp` and `deform` compute; the memory does not grow with the number of states, and nothing but links and
-a pipe is written to a folder. Deform is called as transforms of MONAI and TorchIO are, with numpy arrays."""
+Samples equal what `warp` and `deform` compute; the memory does not grow with the number of states, and nothing but
+links and a pipe is written to a folder. Deform is called as transforms of MONAI and TorchIO are, with numpy arrays."""
 import glob
 import os
 import resource
@@ -46,11 +46,14 @@ def test_augment_three_states_equals_warp_and_deform():
     inside = supine.embed(lungs, np.array(points))
     samples = list(supine.augment(lungs, ct, labels=labels, points=np.array(points), states=states, grid=8.0, **scan))
     assert [sample.state for sample in samples] == states
-    for sample, image, label in zip(samples, grid.warp(ct, states, density=True, **scan), grid.warp(labels, states, labels=True, **scan)):
+    for sample, image, label in zip(samples, grid.warp(ct, states, density=True, **scan),
+                                    grid.warp(labels, states, labels=True, **scan)):
         assert sample.image.dtype == np.int16 and (sample.image == image).all() and (sample.image != ct).any()
         assert (sample.labels == label).all() and (sample.labels != labels).any()
-        pose, order = inside.pose(sample.state), [1, 0]  # the basis has the point of the left lung first, unlike `points`
-        assert (sample.points == inside.deform(pose)[order]).all() and np.abs(sample.points - np.array(points)).max() < 80
+        # the basis has the point of the left lung first, unlike `points`
+        pose, order = inside.pose(sample.state), [1, 0]
+        assert (sample.points == inside.deform(pose)[order]).all()
+        assert np.abs(sample.points - np.array(points)).max() < 80
         assert (sample.points_error == inside.expected_error(sample.state)[order]).all()
         known = ~np.isnan(sample.error)
         assert known.sum() == grid.vertex_count and sample.error.shape == sample.field.shape[:3]
@@ -64,8 +67,10 @@ def test_augment_three_states_equals_warp_and_deform():
 def test_augment_rigid_label_keeps_size():
     ball, z, y, x = labels * 0, *np.meshgrid(*(np.arange(n) * s for n, s in zip(size, step[::-1])), indexing="ij")
     ball[np.linalg.norm([x + low[0] - 75, y + low[1] + 170, z + low[2] + 150], axis=0) < 30] = 1
-    sizes = [(next(supine.augment(lungs, labels=ball, states=["supine:rest"], grid=8.0, rigid=rigid, **scan)).labels == 1).sum() / ball.sum()
-             for rigid in ([], [1])]
+    sizes = []
+    for rigid in ([], [1]):
+        moved = next(supine.augment(lungs, labels=ball, states=["supine:rest"], grid=8.0, rigid=rigid, **scan))
+        sizes.append((moved.labels == 1).sum() / ball.sum())
     print("volume of a ball", sizes)
     assert sizes[0] < 0.8 and abs(sizes[1] - 1) < 0.1
     try:

@@ -61,7 +61,8 @@ run(supine, "embed", "l.safetensors", "--grid", "10", "-o", "g.safetensors")
 for ending in ("nrrd", "nii.gz", "mha"):
     run(supine, "deform", "g.safetensors", "--posture", "prone", "--volume", "rest", "--field-out", f"f.{ending}")
 run(supine, "embed", "l.safetensors", "--grid", "12", "-o", "coarse.safetensors")
-run(supine, "deform", "coarse.safetensors", "--from", "supine:rest", "--posture", "left", "--volume", "full", "--field-out", "coarse.nrrd")
+run(supine, "deform", "coarse.safetensors", "--from", "supine:rest", "--posture", "left", "--volume", "full",
+    "--field-out", "coarse.nrrd")
 for name in ("coarse.nrrd", "f.nrrd"):
     vectors, origin = read_nrrd(name)
     border = max(numpy.abs(numpy.take(vectors, end, axis)).max() for axis in range(3) for end in (0, -1))
@@ -117,7 +118,8 @@ if shutil.which("transformix"):
                    '(MovingInternalImagePixelType "float")\n(UseDirectionCosines "true")\n'
                    f'(Size {vectors.shape[2]} {vectors.shape[1]} {vectors.shape[0]})\n(Index 0 0 0)\n'
                    f'(Spacing 10 10 10)\n(Origin {origin[0]} {origin[1]} {origin[2]})\n(Direction 1 0 0 0 1 0 0 0 1)\n'
-                   '(ResampleInterpolator "FinalBSplineInterpolator")\n(FinalBSplineInterpolationOrder 1)\n(Resampler "DefaultResampler")\n'
+                   '(ResampleInterpolator "FinalBSplineInterpolator")\n(FinalBSplineInterpolationOrder 1)\n(Resampler '
+                   '"DefaultResampler")\n'
                    '(DefaultPixelValue 0)\n(ResultImageFormat "mha")\n(ResultImagePixelType "float")\n')
     k, j, i = numpy.unravel_index(numpy.argmax((vectors ** 2).sum(-1)), vectors.shape[:3])
     point = origin + 10 * numpy.array([i, j, k])
@@ -159,7 +161,8 @@ if vtk:
 os.mkdir("segmentations")
 where = numpy.indices((58, 46, 40)).transpose(1, 2, 3, 0) * [5, 4, 6] + [-141.3, -85.7, -113.9]
 x, y, z = numpy.moveaxis(where, -1, 0)
-lungs = ((abs(x) - 66) / (numpy.where(x > 0, 58, 53) * (1 - .2 * z / 100))) ** 2 + ((y - .25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
+wide = (abs(x) - 66) / (numpy.where(x > 0, 58, 53) * (1 - .2 * z / 100))
+lungs = wide ** 2 + ((y - .25 * z) / 60) ** 2 + (z / 100) ** 2 < 1
 affine = numpy.diag([5.0, 4.0, 6.0, 1.0])
 affine[:3, 3] = [-141.3, -85.7, -113.9]
 for name, part in (("upper_lobe_left", (x < 0) & (z > 0)), ("lower_lobe_left", (x < 0) & (z <= 0)),

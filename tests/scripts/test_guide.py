@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run the code blocks of the guide: test_guide.py SOURCE_FOLDER PROGRAM LIBRARY CC [PAGE...]
 
-The blocks `sh` and `python` of each page run in order, in a folder with the programs of the guide. A block `sh not-run` may not call
-supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work, and
-each page must show a picture, and make it. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
+The blocks `sh` and `python` of each page run in order, in a folder with the programs of the guide. A block `sh not-run`
+may not call supine. Other blocks are not run, and lines in them may not begin with `supine`. Links to files must work,
+and each page must show a picture, and make it. With GUIDE_PICTURES set, these replace the pictures in docs/guide.
 
 Exit with 77 if numpy or nibabel is missing."""
 import glob
@@ -51,7 +51,8 @@ def check_page(page):
         for language, code in blocks:
             if language in ("sh", "python"):
                 command = ["sh", "-ec", code] if language == "sh" else [sys.executable, "-c", code]
-                done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False, timeout=600)
+                done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=False,
+                                      timeout=600)
                 ran += 1
                 if done.returncode != 0:
                     faults.append(f"{name}: exit status {done.returncode} of\n{code}{done.stdout}{done.stderr}")

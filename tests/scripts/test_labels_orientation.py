@@ -26,8 +26,8 @@ faults = 0
 
 
 def made_map():
-    """Return a label map of two ellipsoids with the labels of lungmask, and its affine matrix. The axes are RAS. The right
-    lung is larger. Towards the feet, both lungs become wider and lie further back."""
+    """Return a label map of two ellipsoids with the labels of lungmask, and its affine matrix. The axes are RAS. The
+    right lung is larger. Towards the feet, both lungs become wider and lie further back."""
     affine = numpy.diag([*SPACING, 1.0])
     affine[:3, 3] = [-141.3, -85.7, -113.9]
     index = numpy.stack(numpy.meshgrid(*map(numpy.arange, SIZE), indexing="ij"), -1)

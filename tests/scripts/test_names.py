@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Test that names of structures with commas, quotes and umlauts pass through every CSV file, and that names that are not
-UTF-8 are refused where they are read.
+"""Test that names of structures with commas, quotes and umlauts pass through every CSV file, and that names that are
+not UTF-8 are refused where they are read.
 
     test_names.py SUPINE"""
 import csv
@@ -15,7 +15,8 @@ NAMES = ["nodule, RUL", '5" tube', "Knötchen größer", "#1", "plain"]
 
 
 def run(*arguments):
-    done = subprocess.run([supine, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    done = subprocess.run([supine, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          check=False)
     return done.returncode, done.stdout.decode(errors="replace")
 
 
@@ -57,7 +58,8 @@ with tempfile.TemporaryDirectory() as folder:
     make("embed", "lungs.safetensors", "moved.csv", "-o", "again.safetensors")
     make("deform", "again.safetensors", "--posture", "left", "-o", "again.csv")
     assert sorted(row["name"] for row in rows("again.csv")) == sorted(NAMES)
-    make("locate", "lungs.safetensors", "moved.csv", "--points", "inside.safetensors", "--posture", "left", "-o", "found.csv")
+    make("locate", "lungs.safetensors", "moved.csv", "--points", "inside.safetensors", "--posture", "left", "-o",
+         "found.csv")
     assert sorted(row["name"] for row in rows("found.csv")) == sorted(NAMES)
 
     # Each place where a name is read names the file and, in a text, the line.

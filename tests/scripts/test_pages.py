@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compare docs/model.md and docs/promises.md with the sources: test_pages.py SOURCE_FOLDER
 
-Numbers of the model that stand in a table of the page must be those of the code, each file that the page names must exist,
-and each installed header must have the stability that the page promises."""
+Numbers of the model that stand in a table of the page must be those of the code, each file that the page names must
+exist, and each installed header must have the stability that the page promises."""
 import glob
 import os
 import re

@@ -78,7 +78,8 @@ def check_control_characters():
             (run("info", "renamed.safetensors", "--json"), ""),
             (run("compare", "renamed.safetensors", "--inside", "points.safetensors", "--postures",
                  "supine,prone"), f"nodule{NAME}"),
-            (run("locate", "renamed.safetensors", "observed.csv", "--points", "points.safetensors", "-o", "found.csv", code=2), f"other{NAME}")):
+            (run("locate", "renamed.safetensors", "observed.csv", "--points", "points.safetensors", "-o", "found.csv",
+                 code=2), f"other{NAME}")):
         assert kept in printed, f"{kept!r} is not in {printed!r}"
         for character in printed.replace("\n", ""):
             assert ord(character) >= 0x20, f"control character {character!r} in {printed!r}"

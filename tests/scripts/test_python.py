@@ -86,11 +86,13 @@ with tempfile.TemporaryDirectory() as folder:
     with open(f"{source}/README.md", encoding="utf-8") as readme:
         lines = re.search(r"```python\n(.*?)```", readme.read(), re.S)[1]
     with open(os.path.join(folder, "readme.py"), "w", encoding="utf-8") as program:
-        program.write("import supine\n_ = supine.open('lungs.safetensors')\nvertices, faces = _.vertices, _.triangles\n" + lines)
+        program.write("import supine\n_ = supine.open('lungs.safetensors')\n"
+                      "vertices, faces = _.vertices, _.triangles\n" + lines)
     print(run(python, "readme.py"))
     # Run the example.
     told = run(python, f"{source}/examples/python/lungs.py", "lungs.safetensors", "supine:rest", "left:rest+300")
-    assert re.search(r"left lung: moves by \d.*\nright lung: moves by \d.*\nnodule: moves by \d.*expected error \d", told), told
+    assert re.search(r"left lung: moves by \d.*\nright lung: moves by \d.*\nnodule: moves by \d.*expected error \d",
+                     told), told
     run(supine, "phantom", "-o", "small.ply", "--vertices", "500")
     run(supine, "precompute", "small.ply", "-o", "small.safetensors", "--band", "3")
     print(run(python, f"{source}/tests/bench/bench_python.py", "./reference", "small.safetensors", "2"))

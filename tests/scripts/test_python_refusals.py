@@ -2,7 +2,8 @@
 """Run every `raise` of the Python package: test_python_refusals.py SOURCE_FOLDER PROGRAM LIBRARY
 
 Each case is refused with the words beside it; then each line with a raise statement must have run. A raise that no case
-reaches is a fault, as a wrong name in it would be found by a user. Bases are pickled, and the package says what it misses."""
+reaches is a fault, as a wrong name in it would be found by a user. Bases are pickled, and the package says what it
+misses."""
 import ast
 import glob
 import os
@@ -24,8 +25,8 @@ package = os.path.join(work.name, "python", "supine")
 shutil.copytree(os.path.join(source, "runtime/python/supine"), package)
 
 # Without its library, the package says what is missing.
-told = subprocess.run([sys.executable, "-c", "import supine"], cwd=os.path.dirname(package), capture_output=True, text=True, check=False,
-                      env={**os.environ, "LD_LIBRARY_PATH": ""})
+told = subprocess.run([sys.executable, "-c", "import supine"], cwd=os.path.dirname(package), capture_output=True,
+                      text=True, check=False, env={**os.environ, "LD_LIBRARY_PATH": ""})
 assert "ImportError: the library supine_runtime is neither beside the package" in told.stderr, told.stderr
 shutil.copy(library, os.path.join(package, "libsupine_runtime.so"))
 
@@ -61,7 +62,8 @@ def refused(kind, words, call, *arguments, **keywords):
 
 refused(supine.UnsupportedError, "neither on PATH nor beside", _program.find)
 os.symlink(program, os.path.join(package, "supine"))
-assert subprocess.run([program, "phantom", "--vertices", "600", "-o", "lungs.ply"], stdout=subprocess.DEVNULL, check=True)
+assert subprocess.run([program, "phantom", "--vertices", "600", "-o", "lungs.ply"], stdout=subprocess.DEVNULL,
+                      check=True)
 lungs = supine.precompute("lungs.ply", held_out=5, band=2)
 inside = supine.embed(lungs, {"a": lungs.vertices[0] * .9, "b": lungs.vertices[-1] * .9})
 bad, n = supine.ArgumentError, lungs.vertex_count
@@ -79,7 +81,8 @@ def fill(options):
 for case in (
         (ValueError, "gravity must be 3 numbers", supine.tilt, (0, 1), 5),
         (bad, "not finite", supine.tilt, (0, 1, np.nan), 5),
-        (bad, "has no unit and no reference", lungs.pose, "prone", 500), (bad, "the volume is list", lungs.pose, "prone", ["rest"]),
+        (bad, "has no unit and no reference", lungs.pose, "prone", 500),
+        (bad, "the volume is list", lungs.pose, "prone", ["rest"]),
         (bad, "the gain is nan", lungs.pose("prone").fill, np.nan),
         (ValueError, "of type float32", lungs.deform, lungs.pose("prone"), np.empty(3)),
         (ValueError, "must be contiguous", lungs.deform, lungs.pose("prone"), np.empty((3, n), np.float32).T),
@@ -91,25 +94,33 @@ for case in (
         (TypeError, "cannot be pickled", pickle.dumps, inside.locate([0, 1], inside.vertices, "supine", "scan")),
         (ValueError, "image must be an array [z, y, x]", inside.warp, np.zeros((2, 2)), "prone"),
         (ValueError, "give labels", next, supine.augment(lungs, rigid=[1], states=1)),
-        (bad, "shapes of image and labels differ", next, supine.augment(lungs, np.zeros((2, 2, 2)), labels=np.zeros((3, 2, 2)), states=1)),
-        (ValueError, "2 channels; a scan has 1", supine.Deform(lungs, affine=np.eye(4)), {"image": np.zeros((2, 4, 4, 4))}),
+        (bad, "shapes of image and labels differ", next,
+         supine.augment(lungs, np.zeros((2, 2, 2)), labels=np.zeros((3, 2, 2)), states=1)),
+        (ValueError, "2 channels; a scan has 1", supine.Deform(lungs, affine=np.eye(4)),
+         {"image": np.zeros((2, 4, 4, 4))}),
         (ValueError, "the position of the voxels is unknown", supine.Deform(lungs), {"image": np.zeros((4, 4, 4))}),
         (Exception, "must be a pose", lungs.deform, None),
         (supine.FormatError, "", supine.open, b"no basis"),
-        (bad, "edge takes", fill, {"edge": "far"}), (bad, "band takes", fill, {"band": 2.5}), (bad, "constants takes", fill, {"constants": "1,2"}),
-        (bad, "sex takes", fill, {"sex": "other"}), (bad, "resting takes", fill, {"resting": "supine"}), (bad, "scanned: ", fill, {"scanned": "sideways"}),
-        (bad, "'sideways' is not one of", fill, {"resting": {"sideways": .5}}), (bad, "full takes", fill, {"full": "rest"}),
-        (bad, "expandability takes", fill, {"expandability": "linear:q:1:2"}), (bad, "at most 64", fill, {"lesion": ["0,0,0,1,1"] * 65}),
+        (bad, "edge takes", fill, {"edge": "far"}), (bad, "band takes", fill, {"band": 2.5}),
+        (bad, "constants takes", fill, {"constants": "1,2"}), (bad, "sex takes", fill, {"sex": "other"}),
+        (bad, "resting takes", fill, {"resting": "supine"}), (bad, "scanned: ", fill, {"scanned": "sideways"}),
+        (bad, "'sideways' is not one of", fill, {"resting": {"sideways": .5}}),
+        (bad, "full takes", fill, {"full": "rest"}),
+        (bad, "expandability takes", fill, {"expandability": "linear:q:1:2"}),
+        (bad, "at most 64", fill, {"lesion": ["0,0,0,1,1"] * 65}),
         (bad, "the last two above 0", fill, {"lesion": "0,0,0,0,1"}), (bad, "lung takes", fill, {"lung": "middle:0.5"}),
         (bad, "given twice", fill, {"lung": ["left:0.5", "left:0.4"]}), (bad, "modes takes", fill, {"modes": 65}),
-        (bad, "held_out takes", fill, {"held_out": 0}), (TypeError, "cannot be an array", fill, {"edge": np.ones(2)}), (bad, "no option 'egde'", fill, {"egde": 3}),
+        (bad, "held_out takes", fill, {"held_out": 0}), (TypeError, "cannot be an array", fill, {"edge": np.ones(2)}),
+        (bad, "no option 'egde'", fill, {"egde": 3}),
         (TypeError, "cannot be an array", lambda: supine.embed(lungs, {"a": [0, 0, 0]}, edge=np.ones(2))),
         (ValueError, "vertices must be [N, 3]", supine.precompute, np.zeros((4, 2)), corners),
         (ValueError, "faces must be integers", supine.precompute, points, corners * 1.0),
-        (ValueError, "give each point a name of its own", supine.embed, lungs, {"n": np.zeros((3, 3)), "m": np.zeros((3, 3))}),
+        (ValueError, "give each point a name of its own", supine.embed, lungs,
+         {"n": np.zeros((3, 3)), "m": np.zeros((3, 3))}),
         (ValueError, "points must be [n, 3]", supine.embed, lungs, np.zeros((2, 2))),
         (ValueError, "expected points [P, 3]", supine.save_fields, "f", points, points, points),
-        (ValueError, "expected the run of each row", supine.save_fields, "f", points, points, np.zeros((4, 4, 3)), [1, 2]),
+        (ValueError, "expected the run of each row", supine.save_fields, "f", points, points, np.zeros((4, 4, 3)),
+         [1, 2]),
         (supine.ReadError, "cannot read", supine.precompute, "absent.ply"),
         (supine.Error, "", supine.precompute, points, corners),
         (KeyboardInterrupt, "stopped by the caller", lambda: supine.precompute("lungs.ply", progress=stop))):
@@ -134,6 +145,7 @@ for path in glob.glob(os.path.join(package, "*.py")):
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef) and function.name not in offline | {"_load"}:
             for node in ast.walk(function):
-                if isinstance(node, ast.Raise) and not any((os.path.basename(path), line) in ran for line in range(node.lineno, node.end_lineno + 1)):
+                if isinstance(node, ast.Raise) and not any((os.path.basename(path), line) in ran
+                                                           for line in range(node.lineno, node.end_lineno + 1)):
                     faults.append(f"{os.path.basename(path)}:{node.lineno}: no case runs this raise")
 assert not faults, "\n".join(sorted(set(faults)))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists. README may have up
-to 1,300 words.
+"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists. README may
+have up to 1,300 words.
 
     test_quoted.py SUPINE SOURCE BUILD
 """

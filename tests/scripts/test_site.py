@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Check the site that the target `docs` made: test_site.py BUILD_FOLDER
 
-Its addresses are those that site.py promises, each link leads to a file and, in the pages of the guide, to a heading; the
-live page is the demo's own file; no page names a folder of the machine, or has Markdown left."""
+Its addresses are those that site.py promises, each link leads to a file and, in the pages of the guide, to a heading;
+the live page is the demo's own file; no page names a folder of the machine, or has Markdown left."""
 import filecmp
 import html.parser
 import os
@@ -71,8 +71,8 @@ for path, page in pages.items():
         text = file.read()
         if os.path.abspath(sys.argv[1]) in text or (not made and "/tmp" in own + text):
             faults.append(f"{own}: names a folder of this machine")
-for address in ("index.html", "live.html", "guide/index.html", "guide/navigation.html", "guide/first-lungs.html", "model.html",
-                "accuracy.html", "reference/index.html"):
+for address in ("index.html", "live.html", "guide/index.html", "guide/navigation.html", "guide/first-lungs.html",
+                "model.html", "accuracy.html", "reference/index.html"):
     if not os.path.exists(os.path.join(site, address)):
         faults.append(f"no page {address}")
 if not filecmp.cmp(os.path.join(site, "live.html"), os.path.join(docs, "demo", "lungs.html"), shallow=False):

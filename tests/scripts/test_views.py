@@ -60,29 +60,34 @@ with tempfile.TemporaryDirectory() as folder:
         run("render", "b.safetensors", "--posture", "prone", "-o", "r.svg")
         run("deform", "i.safetensors", "--posture", "prone", "-o", "o.csv")
         run("deform", "b.safetensors", "--posture", "prone", "-o", "o.ply")
-        code = "import supine, json; b = supine.open('b.safetensors'); print(json.dumps([[f._asdict() for f in b.facts], b.caveats]))"
+        code = ("import supine, json; b = supine.open('b.safetensors'); "
+                "print(json.dumps([[f._asdict() for f in b.facts], b.caveats]))")
         package = os.path.join(folder, "python", "supine")
         if not os.path.isdir(package):
             shutil.copytree(os.path.join(source, "runtime/python/supine"), package)
             shutil.copy(library, os.path.join(package, "libsupine_runtime.so"))
         beside = {**os.environ, "PYTHONPATH": os.path.join(folder, "python")}
-        python = subprocess.run([sys.executable, "-c", code], cwd=folder, env=beside, text=True, capture_output=True, check=False)
+        python = subprocess.run([sys.executable, "-c", code], cwd=folder, env=beside, text=True, capture_output=True,
+                                check=False)
         assert python.returncode == 0, python.stderr
         listed, line = json.loads(python.stdout)
         assert [fact["name"] + fact["line"] for fact in listed] == [fact["name"] + fact["line"] for fact in facts]
         data = json.loads(html.unescape(re.search(r'<data id="basis" hidden>(.*?)</data>', read("page.html"), re.S)[1]))
         page = " ".join([data["caveats"], *(f"{fact['name']} {fact['line']}" for fact in data["facts"])])
-        views = {"info": " ".join(run("info", "b.safetensors").split()), "report": text_of(read("r.html")), "page": page,
-                 "points": read("o.csv").split("\nname,")[0], "surface": read("o.ply").split("end_header")[0], "python": line}
+        views = {"info": " ".join(run("info", "b.safetensors").split()), "report": text_of(read("r.html")),
+                 "page": page, "points": read("o.csv").split("\nname,")[0],
+                 "surface": read("o.ply").split("end_header")[0], "python": line}
         glyphs = re.findall('href="#glyph([^"]*)"', read("r.svg"))
         for fact, (view, shown) in itertools.product(caveats, views.items()):
             assert fact["name"] in shown, (kind, fact["name"], view)
         for fact in caveats:
             words = [word for word in re.findall("[a-z]+", f"{fact['name']} {fact['source']}")
-                     if len(set(word)) < len(word) > 4 and not re.search("f[fil]", word)]  # which are one glyph in some fonts
+                     # which are one glyph in some fonts
+                     if len(set(word)) < len(word) > 4 and not re.search("f[fil]", word)]
             for word in words:
                 assert drawn(word, glyphs), (kind, word, "render")
-    assert counts["healthy"]["volume at rest, supine"] == "assumed" and counts["given"]["volume at rest, supine"] == "given"
+    assert counts["healthy"]["volume at rest, supine"] == "assumed"
+    assert counts["given"]["volume at rest, supine"] == "given"
     assert counts["collapsed"]["left lung"] == "collapsed" and "left lung" not in counts["healthy"]
     assert counts["rest"]["full inflation, supine"] == "assumed" and counts["rest"]["state in the scan"] == "given"
     assert counts["given"]["axes of the scan"] == "given" and counts["given"]["full inflation, supine"] == "measured"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Check the workflows without running them: test_workflows.py SOURCE_FOLDER
 
-Each file must be YAML with triggers, least permissions, and jobs in a Debian container with a time limit. Each command of
-cmake/debian.sh and each target that a step names must exist, and README's two commands and `platforms` must be run.
+Each file must be YAML with triggers, least permissions, and jobs in a Debian container with a time limit. Each command
+of cmake/debian.sh and each target that a step names must exist, and README's two commands and `platforms` must be run.
 Exit with 77 if python3-yaml is missing."""
 import glob
 import os

@@ -31,8 +31,8 @@ def number_messages(link, begin):
 
 
 def wait_for(read, is_wanted):
-    """Call `read`, which returns the time stamp and the content of the newest message, or None, until `is_wanted` is true
-    of both. Return the content."""
+    """Call `read`, which returns the time stamp and the content of the newest message, or None, until `is_wanted` is
+    true of both. Return the content."""
     end = time.monotonic() + 100  # ends a test that hangs
     while time.monotonic() < end:
         found = read()

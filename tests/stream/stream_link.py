@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Test the example of a client in Python with a real server: stream_link.py FOLDER PORT BASIS
 
-The client shares no code with the server: it was written from the descriptions of the protocol and of the basis file."""
+The client shares no code with the server: it was written from the descriptions of the protocol and of the basis
+file."""
 import sys
 
 sys.path.insert(0, sys.argv[1])

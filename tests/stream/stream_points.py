@@ -3,7 +3,8 @@
 
     stream_points.py PROGRAM FOLDER_OF_SUPINE_LINK
 
-The observed points come from deformed and shifted lungs. Send a TRANSFORM message for each, then all in a POINT message."""
+The observed points come from deformed and shifted lungs. Send a TRANSFORM message for each, then all in a POINT
+message."""
 import csv
 import os
 import re

@@ -72,7 +72,8 @@ else:
     assert model.mesh.GetNumberOfPolys() == len(surface.triangles) // 3
     assert max(abs(a - b) for a, b in zip(model.mesh.GetPoint(7), points[21:24])) < 1e-6
 
-# The scripted module, with stand-ins for Slicer's modules: it starts, follows a transform, stops, and reports a dead server.
+# The scripted module, with stand-ins for Slicer's modules: it starts, follows a transform, stops, and reports a dead
+# server.
 import os  # noqa: E402
 import types  # noqa: E402
 from unittest import mock  # noqa: E402

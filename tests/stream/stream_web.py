@@ -17,8 +17,8 @@ LEFT_FILES = "/tmp/supine-page-*"
 
 
 def ask(port, headers, path="/"):
-    """Send a request. Return the code of the answer, 0 if there is none, and its body; of a WebSocket, which stays open, an
-    empty body."""
+    """Send a request. Return the code of the answer, 0 if there is none, and its body; of a WebSocket, which stays
+    open, an empty body."""
     with socket.create_connection(("127.0.0.1", port), timeout=60) as link:
         link.sendall(f"GET {path} HTTP/1.1\r\n{headers}\r\n".encode())
         got = b""
@@ -40,9 +40,9 @@ def check(port):
     here = f"127.0.0.1:{port}"
     good = [here, "127.0.0.1", "127.0.0.1:9000", f"localhost:{port}", "LocalHost", "[::1]:9000", "192.168.1.7",
             f"lungs.example:{port}", "LUNGS.example", "other.example"]
-    evil = ["evil.example", f"evil.example:{port}", "127.0.0.1.evil.example", "localhost.evil.example", "evil.lungs.example",
-            "lungs.example.evil", "lungs", "[::1", "[evil]", "127.1", "", "127.0.0.1@evil.example", "lungs.example,other.example",
-            "x" * 300]
+    evil = ["evil.example", f"evil.example:{port}", "127.0.0.1.evil.example", "localhost.evil.example",
+            "evil.lungs.example", "lungs.example.evil", "lungs", "[::1", "[evil]", "127.1", "",
+            "127.0.0.1@evil.example", "lungs.example,other.example", "x" * 300]
     pages = set()
     for host in good:
         code, page = ask(port, f"Host: {host}\r\n")
@@ -78,8 +78,8 @@ with tempfile.TemporaryDirectory(prefix="supine-stream-") as folder:
         print("skipped: libwebsockets is not installed")
         sys.exit(77)
     before = files(temporary)
-    server = subprocess.Popen([supine, "stream", basis, "--listen", "0", "--web", "0", "--volume", "rest", "--seconds", "300",
-                               "--web-host", "lungs.example,other.example"],
+    server = subprocess.Popen([supine, "stream", basis, "--listen", "0", "--web", "0", "--volume", "rest", "--seconds",
+                               "300", "--web-host", "lungs.example,other.example"],
                               stdout=subprocess.PIPE, text=True, env=dict(os.environ, TMPDIR=temporary))
     try:
         site = re.match(r"page at http://127.0.0.1:(\d+)/", server.stdout.readline())

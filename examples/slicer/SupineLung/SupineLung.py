@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A scripted module for 3D Slicer: lungs that deform with the orientation of a linear transform node.
 
-Add this folder to "Additional module paths" in Slicer's settings, or build it with CMakeLists.txt as part of an extension.
-It needs slicer_lung.py, which has the command of the server, from the folder above or beside this file,
-and supine_link.py, from examples/tracker or beside this file."""
+Add this folder to "Additional module paths" in Slicer's settings, or build it with CMakeLists.txt as part of an
+extension. It needs slicer_lung.py, which has the command of the server, from the folder above or beside this file, and
+supine_link.py, from examples/tracker or beside this file."""
 import os
 import sys
 
@@ -24,7 +24,8 @@ class SupineLung(ScriptedLoadableModule):
         parent.title = "Supine Lung"
         parent.categories = ["IGT"]
         parent.contributors = ["Supine"]
-        parent.helpText = "Start `supine stream` as slicer_lung.py says, choose a linear transform with the patient's orientation."
+        parent.helpText = ("Start `supine stream` as slicer_lung.py says, choose a linear transform with the patient's "
+                           "orientation.")
 
 
 class SupineLungWidget(ScriptedLoadableModuleWidget):

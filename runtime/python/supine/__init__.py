@@ -33,10 +33,10 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
                        OutOfMemoryError, ReadError, UnsupportedError)
 from ._program import save_fields
 
-__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "another_day", "Deform", "Sample", "Basis",
-           "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_quaternion", "tilt", "roll", "postures", "breath", "Gravity",
-           "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError", "OpenSurfaceError",
-           "OutOfMemoryError", "ReadError", "UnsupportedError"]
+__all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "another_day", "Deform", "Sample",
+           "Basis", "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_quaternion", "tilt", "roll",
+           "postures", "breath", "Gravity", "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError",
+           "OpenSurfaceError", "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
 
 Gravity = Union[str, Sequence[float], NDArray[np.float64]]
@@ -138,8 +138,8 @@ class Pose(_c.CPose):
         return _restore_pose, (bytes(self),)  # without the basis, which is pickled by itself
 
     def fill(self, gain: float) -> Pose:
-        """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces. Volumes that
-        lungs cannot hold are refused, as by `Basis.pose`."""
+        """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces. Volumes
+        that lungs cannot hold are refused, as by `Basis.pose`."""
         if not np.isfinite(gain):
             raise ArgumentError(f"the gain is {gain}: give a finite number")
         if self._made is not None:
@@ -208,8 +208,8 @@ class _Owner:
 
 
 class Target(NamedTuple):
-    """A named structure: its lung, the mean position `at` of its vertices, the displacement `move` of this position, its
-    length `mm`, and the expected errors, mm (3-D RMS; NaN if unknown): of the position, in the session of the scan
+    """A named structure: its lung, the mean position `at` of its vertices, the displacement `move` of this position,
+    its length `mm`, and the expected errors, mm (3-D RMS; NaN if unknown): of the position, in the session of the scan
     (`expected_error`) and on another day (`another_day_error`), and of the displacement (`moved_error`). Vectors are in
     mm, LPS. `anatomy` is true for a large part, such as airways, vessels or a lobe, of which these are means, and false
     for a target."""
@@ -225,10 +225,10 @@ class Target(NamedTuple):
 
 
 class Fact(NamedTuple):
-    """What a basis assumes or was given: `value` in `unit`, with its range, one standard deviation to either side; numbers
-    that there are not are NaN. `text` holds words, such as the state in the scan. `source` is "given", "measured",
-    "fitted", "simulated", "assumed", "computed" or "collapsed", and `origin` continues it ("from healthy people"). Views of
-    the lungs must name facts with a `caveat`."""
+    """What a basis assumes or was given: `value` in `unit`, with its range, one standard deviation to either side;
+    numbers that there are not are NaN. `text` holds words, such as the state in the scan. `source` is "given",
+    "measured", "fitted", "simulated", "assumed", "computed" or "collapsed", and `origin` continues it ("from healthy
+    people"). Views of the lungs must name facts with a `caveat`."""
     name: str
     text: str
     value: float
@@ -257,7 +257,8 @@ class Basis:
     bounds: float32 [lungs, 2, 3], lowest and highest corner of the box around each lung, mm
     lungs: dict from the name of each lung to the slice of its vertices
     metadata: dict from the keys of the file's metadata to the texts
-    order: highest degree of the polynomials of a lung's volume in another simulator's fields over gravity and volume; if
+    order: highest degree of the polynomials of a lung's volume in another simulator's fields over gravity and volume;
+    if
         it is above 0, each lung has weights of its own
     storage_error: bound on position errors from storage and rounding, for 500 mL above the reference surface, mm
     report: what the program printed when `precompute` or `embed` made the basis
@@ -267,7 +268,8 @@ class Basis:
     def __init__(self, source: Source, *, storage: str = "auto", simd: str = "auto", normals: bool = True,
                  allow_folds: bool = False) -> None:
         self._options = {"storage": storage, "simd": simd, "normals": normals, "allow_folds": allow_folds}
-        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals, allow_folds)
+        options = _c.Options(ctypes.sizeof(_c.Options), STORAGES.index(storage), SIMDS.index(simd), not normals,
+                             allow_folds)
         self._owner = _Owner(source, options)
         self._c = self._owner.pointer
         info = _c.basis_get_info(self._c).contents
@@ -299,8 +301,8 @@ class Basis:
                                                (count, 2, 3))
 
     def __reduce__(self) -> Any:
-        """Pickle what the basis was opened from: its bytes, or the absolute path of its file. It is opened again where it is
-        unpickled, as in the workers of a data loader."""
+        """Pickle what the basis was opened from: its bytes, or the absolute path of its file. It is opened again where
+        it is unpickled, as in the workers of a data loader."""
         source = self._owner.source
         if isinstance(source, (bytearray, memoryview)):
             source = bytes(source)
@@ -339,8 +341,8 @@ class Basis:
         made = []
         for fact in facts[:count]:
             _c.fact_print(fact, line, len(line))
-            made.append(Fact(_c.string(fact.name), _c.string(fact.text), fact.value, fact.low, fact.high, _c.string(fact.unit),
-                             _c.string(_c.fact_source_name(fact.source)), _c.string(fact.origin),
+            made.append(Fact(_c.string(fact.name), _c.string(fact.text), fact.value, fact.low, fact.high,
+                             _c.string(fact.unit), _c.string(_c.fact_source_name(fact.source)), _c.string(fact.origin),
                              _c.fact_is_caveat(fact), _c.string(line.value)))
         return made
 
@@ -371,9 +373,10 @@ class Basis:
 
     def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
         """Compute the expected error [N] of the vertices in a state, mm (3-D RMS): of their positions in the session of
-        the scan, or of their displacements from the state `since`. Half of all points lie within 0.9 times their expected
-        error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change of posture
-        they are extrapolated. On another day than that of the scan, positions have the error `another_day`."""
+        the scan, or of their displacements from the state `since`. Half of all points lie within 0.9 times their
+        expected error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change
+        of posture they are extrapolated. On another day than that of the scan, positions have the error
+        `another_day`."""
         sigma = np.empty(self.vertex_count, _FLOAT)
         _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
                           _address(sigma, self.vertex_count, "sigma"))
@@ -387,11 +390,12 @@ class Basis:
         _c.doubt_prepare(_c.DoubtTask(self._c, len(states), given, origin, another_day), space.ctypes.data, field)
         return field, space
 
-    def covariance(self, vertices: Sequence[int], states: Union[Gravity, Sequence[Gravity]], since: Optional[Gravity] = None,
+    def covariance(self, vertices: Sequence[int], states: Union[Gravity, Sequence[Gravity]],
+                   since: Optional[Gravity] = None,
                    *, another_day: bool = False) -> tuple[Doubles, Doubles]:
-        """Compute the predicted positions [S, n, 3] of n vertices in S states, mm, and the covariance [S, n, 3, S, n, 3] of
-        their errors, mm^2. Errors of neighbours are alike: the error of a distance, of a mean or of a plan follows from the
-        covariance, never from `expected_error` alone. Equations and evidence: <supine/doubt.h>.
+        """Compute the predicted positions [S, n, 3] of n vertices in S states, mm, and the covariance [S, n, 3, S, n,
+        3] of their errors, mm^2. Errors of neighbours are alike: the error of a distance, of a mean or of a plan
+        follows from the covariance, never from `expected_error` alone. Equations and evidence: <supine/doubt.h>.
 
         since: state whose positions are exact, if it is not the scan's
         another_day: whether the lungs are those of another day than the scan"""
@@ -400,13 +404,14 @@ class Basis:
         points = [(int(vertex), state) for state in range(len(wanted)) for vertex in vertices]
         mean = np.empty((len(wanted), len(vertices), 3))
         covariance = np.empty(mean.shape + mean.shape)
-        _c.doubt_covariance(field, len(points), (_c.DoubtPoint * len(points))(*points), mean.ctypes.data, covariance.ctypes.data)
+        _c.doubt_covariance(field, len(points), (_c.DoubtPoint * len(points))(*points), mean.ctypes.data,
+                            covariance.ctypes.data)
         return mean, covariance
 
     def samples(self, state: Gravity, count: int, seed: int = 0, since: Optional[Gravity] = None, *,
                 another_day: bool = False) -> Floats:
-        """Draw `count` plausible lungs around those computed for a state: positions [count, N, 3], mm. Their spread is the
-        expected error, before the best translation is taken out (a factor of 1.15). Their volumes are not exact."""
+        """Draw `count` plausible lungs around those computed for a state: positions [count, N, 3], mm. Their spread is
+        the expected error, before the best translation is taken out (a factor of 1.15). Their volumes are not exact."""
         field, _space = self._doubt([state], since, another_day)
         made = np.empty((count, self.vertex_count, 3), _FLOAT)
         for index in range(count):
@@ -415,8 +420,9 @@ class Basis:
 
     def registered_error(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
                          another_day: bool = False) -> Floats:
-        """Compute the expected error [N] of the vertices, mm (3-D RMS), that remains after a rigid registration at fiducials,
-        vertices of this basis: the target registration error. Give at least three, spread around the targets."""
+        """Compute the expected error [N] of the vertices, mm (3-D RMS), that remains after a rigid registration at
+        fiducials, vertices of this basis: the target registration error. Give at least three, spread around the
+        targets."""
         field, _space = self._doubt([state], since, another_day)
         places = (ctypes.c_size_t * len(fiducials))(*map(int, fiducials))
         space, frame = np.empty(_c.doubt_frame_space(len(fiducials))), ctypes.c_void_p()
@@ -503,8 +509,10 @@ class Basis:
                 file.write(header)
                 file.write(image.data)
             with io.open(table, "wb") as file:
-                file.write(_program.table([["posture", "output"], *([state, f"{i}.nrrd"] for i, state in enumerate(wanted))]))
-            options = {"states": table, "labels" if labels else "image": scan, "density": density, "from": since or None}
+                file.write(_program.table([["posture", "output"],
+                                           *([state, f"{i}.nrrd"] for i, state in enumerate(wanted))]))
+            options = {"states": table, "labels" if labels else "image": scan, "density": density,
+                       "from": since or None}
             _program.run("deform", [basis], options, {basis: "basis", scan: "image"}, None)
             moved = []
             for i in range(len(wanted)):
@@ -514,8 +522,8 @@ class Basis:
         return moved[0] if isinstance(states, str) else moved
 
     def weights(self, pose: Pose) -> Doubles:
-        """Return a view of the weights of a pose, one for each mode. In a basis of another simulator's fields over gravity
-        and volume (`order` above 0), each lung has weights of its own: [lungs, modes]."""
+        """Return a view of the weights of a pose, one for each mode. In a basis of another simulator's fields over
+        gravity and volume (`order` above 0), each lung has weights of its own: [lungs, modes]."""
         shape = (len(self.lungs), self.mode_count) if self.order > 0 else (self.mode_count,)
         return np.ctypeslib.as_array(pose.weights)[:int(np.prod(shape))].reshape(shape)
 
@@ -555,7 +563,8 @@ class Basis:
 
     def deform_lit(self, pose: Pose, out: Optional[Floats] = None, normals: Optional[Floats] = None,
                    begin: int = 0, end: Optional[int] = None) -> tuple[Floats, Floats]:
-        """Compute positions and unit normals: from vectors in the file if it `has_normals`, or else from the triangles."""
+        """Compute positions and unit normals: from vectors in the file if it `has_normals`, or else from the
+        triangles."""
         end, size = self._range(begin, end)
         out = np.empty((end - begin, 3), _FLOAT) if out is None else out
         normals = np.empty((end - begin, 3), _FLOAT) if normals is None else normals
@@ -618,7 +627,8 @@ class Location:
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])
 
     def __reduce__(self) -> Any:
-        raise TypeError("a location cannot be pickled, as it refers to memory of the C library: pickle the observed positions")
+        raise TypeError("a location cannot be pickled, as it refers to memory of the C library: pickle the observed "
+                        "positions")
 
     def positions(self, basis: Basis) -> tuple[Floats, Floats]:
         """Compute the positions [N, 3] of the vertices of `basis` in the frame of the observations, and their expected
@@ -648,8 +658,8 @@ def open(source: Source, *, storage: str = "auto", simd: str = "auto", normals: 
 
 
 def precompute(*surfaces: Any, progress: Optional[_program.Progress] = None, **options: Any) -> Basis:
-    """Make a basis from lung surfaces. Use the offline library (GPL) if it is installed, else the program `supine`, beside
-    this package or on PATH. Examples:
+    """Make a basis from lung surfaces. Use the offline library (GPL) if it is installed, else the program `supine`,
+    beside this package or on PATH. Examples:
 
         precompute(vertices, faces, scanned="supine:rest")      # vertices [N, 3], faces [M, 3] of one lung or both
         precompute((vertices, faces), (vertices, faces))        # one surface for each lung

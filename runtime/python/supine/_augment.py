@@ -46,9 +46,9 @@ class Sample:
 
 
 def random_states(lungs: Any, count: int, seed: Any = None) -> list[str]:
-    """Draw states: the posture is supine, prone, left or right, each with probability 1/4; gravity is tilted towards the
-    head or the feet by an angle with a normal distribution (SD 10 degrees, redrawn beyond 30); the volume is uniform
-    between rest and full inflation in this posture. `seed` is an integer or a numpy Generator."""
+    """Draw states: the posture is supine, prone, left or right, each with probability 1/4; gravity is tilted towards
+    the head or the feet by an angle with a normal distribution (SD 10 degrees, redrawn beyond 30); the volume is
+    uniform between rest and full inflation in this posture. `seed` is an integer or a numpy Generator."""
     number, states = np.random.default_rng(seed), []
     for _ in range(count):
         posture, degrees = ("supine", "prone", "left", "right")[number.integers(4)], np.inf
@@ -108,12 +108,13 @@ class _Pipe:
         return self.read(np.empty(shape, "<" + _NIFTI[int(np.frombuffer(head, "<i2", 1, 70)[0])]))
 
 
-def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optional[NDArray[Any]] = None, points: Any = None,
-            states: Union[int, Sequence[str]] = 100, step: ArrayLike = (1.0, 1.0, 1.0), origin: ArrayLike = (0.0, 0.0, 0.0),
+def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optional[NDArray[Any]] = None,
+            points: Any = None, states: Union[int, Sequence[str]] = 100, step: ArrayLike = (1.0, 1.0, 1.0),
+            origin: ArrayLike = (0.0, 0.0, 0.0),
             grid: float = 4.0, density: bool = True, rigid: Sequence[int] = (), seed: Any = None) -> Iterator[Sample]:
     """Move a CT, a label map and points of the scan into each of many states. The program `supine` reads them once and
-    sends each state through a pipe, when it is asked for: nothing is written to a disk, and the memory does not grow with
-    the number of states. Needs Linux.
+    sends each state through a pipe, when it is asked for: nothing is written to a disk, and the memory does not grow
+    with the number of states. Needs Linux.
 
         for sample in supine.augment(lungs, image=ct, labels=masks, points=nodules, states=1000, seed=1):
             train(sample.image, sample.labels)
@@ -132,10 +133,12 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
     from . import embed  # the package imports this module
 
     if image is not None and labels is not None and image.shape != labels.shape:
-        raise _c.ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both on the same voxels")
+        raise _c.ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both "
+                               f"on the same voxels")
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
     inside = None if points is None else embed(lungs, points)
-    order = None if inside is None else np.argsort(inside.tensor("part"), kind="stable")  # a basis groups points by lung
+    # a basis groups points by lung
+    order = None if inside is None else np.argsort(inside.tensor("part"), kind="stable")
     nodes = embed(lungs, grid=grid)
     frame, shape = nodes.tensor("grid"), tuple(int(n) for n in nodes.tensor("grid_size"))[::-1]
     place = np.rint((nodes.vertices - frame[0]) @ np.linalg.inv(frame[1:])).astype(int)
@@ -152,7 +155,8 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
                 options[name] = _in_memory(stack, folder, name + ".nrrd", nrrd(array, step, origin), array.data)
         # Every output is a name of one pipe: fields and images come in the order in which the program writes them.
         os.mkfifo(os.path.join(folder, "pipe"))
-        columns = [["output"], ["output", "field"], ["output", "labels", "field"]][(image is not None) + (labels is not None)]
+        columns = [["output"], ["output", "field"],
+                   ["output", "labels", "field"]][(image is not None) + (labels is not None)]
         rows = [["posture", *columns]]
         for i, state in enumerate(wanted):
             outputs = [f"{i}-{column}.nii" for column in columns]
@@ -181,23 +185,25 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
 class Deform:
     """Moves the scan of a subject into a random state each time it is called: `subject = transform(subject)`.
 
-    A subject is a mapping, as for the dictionary transforms of MONAI (arrays or tensors [channel, x, y, z], or [x, y, z]),
-    or a Subject of TorchIO (images with `data` and `set_data`). Neither package is imported. The copy that is returned has
-    the moved image and labels, and `state`, the state that was drawn.
+    A subject is a mapping, as for the dictionary transforms of MONAI (arrays or tensors [channel, x, y, z], or [x, y,
+    z]), or a Subject of TorchIO (images with `data` and `set_data`). Neither package is imported. The copy that is
+    returned has the moved image and labels, and `state`, the state that was drawn.
 
     lungs: basis of this subject's scan
     image, label: keys of the CT and of the label map; None if there is none
     affine: voxel to mm, RAS [4, 4], for arrays that have no attribute `affine`
     states: states to draw from, or None for those of random_states; `seed`, `grid` and `density`: as in `augment`"""
 
-    def __init__(self, lungs: Any, image: Optional[str] = "image", label: Optional[str] = "label", *, affine: Any = None,
-                 states: Optional[Sequence[str]] = None, grid: float = 4.0, density: bool = True, seed: Any = None) -> None:
+    def __init__(self, lungs: Any, image: Optional[str] = "image", label: Optional[str] = "label", *,
+                 affine: Any = None, states: Optional[Sequence[str]] = None, grid: float = 4.0, density: bool = True,
+                 seed: Any = None) -> None:
         self.lungs, self.image, self.label, self.affine, self.states = lungs, image, label, affine, states
         self.options = {"grid": grid, "density": density}
         self.number = np.random.default_rng(seed)
 
     def __call__(self, subject: Any) -> Any:
-        keys = {name: key for name, key in (("image", self.image), ("labels", self.label)) if key is not None and key in subject}
+        keys = {name: key for name, key in (("image", self.image), ("labels", self.label)) if key is not None
+                and key in subject}
         affine, arrays = self.affine, {}
         for name, key in keys.items():
             item = subject[key]
@@ -209,7 +215,8 @@ class Deform:
         if affine is None:
             raise ValueError("the position of the voxels is unknown: give affine, voxel to mm, RAS [4, 4]")
         lps = np.diag([-1, -1, 1, 1]) @ np.asarray(affine, float)
-        state = random_states(self.lungs, 1, self.number)[0] if self.states is None else str(self.number.choice(self.states))
+        state = random_states(self.lungs, 1,
+                              self.number)[0] if self.states is None else str(self.number.choice(self.states))
         sample, = augment(self.lungs, states=[state], step=lps[:3, :3].T, origin=lps[:3, 3], **arrays, **self.options)
         result = copy.copy(subject)
         for name, key in keys.items():

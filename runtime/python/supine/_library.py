@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
-from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_uint64, c_void_p
+from ctypes import (POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int16, c_size_t, c_uint32, c_uint64,
+                    c_void_p)
 from typing import Any, Optional
 
 from . import _remedies
@@ -23,7 +24,8 @@ def _load() -> ctypes.CDLL:
     """Load the run-time library."""
     path = _path("supine_runtime")
     if path is None:
-        raise ImportError("the library supine_runtime is neither beside the package nor in the system: install the wheel, or "
+        raise ImportError("the library supine_runtime is neither beside the package nor in the system: install the "
+                          "wheel, or "
                           "the library, or copy libsupine_runtime.so into " + os.path.dirname(__file__))
     return ctypes.CDLL(path)
 
@@ -188,7 +190,8 @@ class DoubtPoint(ctypes.Structure):
 
 class Surface(ctypes.Structure):
     """The C struct supine_precompute_surface."""
-    _fields_ = [("vertex_count", c_size_t), ("vertices", c_void_p), ("triangle_count", c_size_t), ("triangles", c_void_p)]
+    _fields_ = [("vertex_count", c_size_t), ("vertices", c_void_p), ("triangle_count", c_size_t),
+                ("triangles", c_void_p)]
 
 
 ProgressFunction = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
@@ -222,8 +225,9 @@ class Lesion(ctypes.Structure):
 
 class Tissue(ctypes.Structure):
     """The C struct supine_precompute_tissue; `start` and `end` are its members from and to."""
-    _fields_ = [("profile", c_int), ("axis", c_int), ("start", c_double), ("end", c_double), ("expandability", c_char_p),
-                ("lesion_count", c_size_t), ("lesions", Lesion * 64), ("share", c_double * 2)]
+    _fields_ = [("profile", c_int), ("axis", c_int), ("start", c_double), ("end", c_double),
+                ("expandability", c_char_p), ("lesion_count", c_size_t), ("lesions", Lesion * 64),
+                ("share", c_double * 2)]
 
 
 class Rest(ctypes.Structure):
@@ -254,8 +258,9 @@ class Report(ctypes.Structure):
     _fields_ = [("lung_count", c_size_t), ("vertex_count", c_size_t), ("band", c_size_t), ("mode_count", c_size_t),
                 ("direction_count", c_size_t), ("relative", c_double * 3), ("mm", c_double * 3), ("rest_known", c_bool),
                 ("rest_part", c_double), ("volume", c_double), ("turned_over", c_double), ("band_count", c_size_t),
-                ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t), ("extrapolated", c_double),
-                ("cluster_count", c_size_t), ("volume_error", c_double), ("six_volumes", c_double), ("displacement", c_double), ("nearest_supine", c_double * 3),
+                ("band_error", c_double * 12), ("volume_count", c_size_t), ("order", c_size_t),
+                ("extrapolated", c_double), ("cluster_count", c_size_t), ("volume_error", c_double),
+                ("six_volumes", c_double), ("displacement", c_double), ("nearest_supine", c_double * 3),
                 ("along_gravity", c_double), ("turning_rms", c_double)]
 
 
@@ -298,7 +303,8 @@ def _checked(name: str, *arguments: Any) -> Any:
     return call
 
 
-_POSED = {1: b"the pose was made by another basis, or has a number that is not finite: make it by Basis.pose of this basis",
+_POSED = {1: b"the pose was made by another basis, or has a number that is not finite: make it by Basis.pose of this "
+          b"basis",
           6: b"the surface is open and encloses no volume",
           7: b"the basis was made or opened without normals: normals() computes them from the triangles"}
 
@@ -362,7 +368,8 @@ doubt_prepare = _checked("doubt_prepare", POINTER(DoubtTask), c_void_p, POINTER(
 doubt_covariance = _checked("doubt_covariance", c_void_p, c_size_t, POINTER(DoubtPoint), c_void_p, c_void_p)
 doubt_sample = _checked("doubt_sample", c_void_p, c_size_t, c_uint64, c_size_t, c_void_p)
 doubt_frame_space = _declare("doubt_frame_space", c_size_t, c_size_t)
-doubt_frame_prepare = _checked("doubt_frame_prepare", c_void_p, c_size_t, POINTER(c_size_t), c_void_p, POINTER(c_void_p))
+doubt_frame_prepare = _checked("doubt_frame_prepare", c_void_p, c_size_t, POINTER(c_size_t), c_void_p,
+                               POINTER(c_void_p))
 doubt_frame_errors = _posed("doubt_frame_errors", c_void_p, c_size_t, c_size_t, c_void_p)
 expected_another_day = _declare("expected_another_day", c_double, c_double)
 locate_space = _declare("locate_space", c_size_t, c_size_t)

@@ -22,7 +22,8 @@ from . import _library as _c
 from . import _options, _remedies
 
 Progress = Callable[[float], Any]
-_EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError, 5: _c.NumericalError}
+_EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError,
+                                     5: _c.NumericalError}
 
 
 def find() -> str:
@@ -71,7 +72,8 @@ def _write_mesh(path: str, points: np.ndarray[Any, Any], corners: np.ndarray[Any
     with open(path, "wb") as file:
         file.write(b"ply\nformat binary_little_endian 1.0\n"
                    b"element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
-                   b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % (len(points), len(corners)))
+                   b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" %
+                   (len(points), len(corners)))
         file.write(points.tobytes() + records.tobytes())
 
 
@@ -86,7 +88,8 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
     """Write points [n, 3], or a dict from names to points, as CSV."""
     for name, place in points.items() if isinstance(points, Mapping) else ():
         if np.shape(place) != (3,):
-            raise ValueError(f"point {name!r} must be three numbers x, y, z, not {list(np.shape(place))}: give each point a "
+            raise ValueError(f"point {name!r} must be three numbers x, y, z, not {list(np.shape(place))}: give each "
+                             f"point a "
                              "name of its own")
     names = [[name] for name in points] if isinstance(points, Mapping) else None
     places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
@@ -119,7 +122,8 @@ def save_fields(path: Union[str, "os.PathLike[str]"], points: ArrayLike, gravity
     if run is not None:
         arrays["run"] = np.asarray(run, "<f4")
         if arrays["run"].shape != shapes[2][:1]:
-            raise ValueError(f"expected the run of each row of displacement, {list(shapes[2][:1])}, not {list(arrays['run'].shape)}")
+            raise ValueError(f"expected the run of each row of displacement, {list(shapes[2][:1])}, not "
+                             f"{list(arrays['run'].shape)}")
     header, end = {}, 0
     for name, array in arrays.items():
         header[name] = {"dtype": "F32", "shape": array.shape, "data_offsets": [end, end + array.nbytes]}
@@ -151,8 +155,8 @@ def _listen(terminal: int, command: str, progress: Optional[Progress]) -> str:
 
 
 def _own_names(text: str) -> str:
-    """Replace options of the command, such as --held-out, by the arguments that become them, such as held_out. Commands to
-    type, in quotes, stay."""
+    """Replace options of the command, such as --held-out, by the arguments that become them, such as held_out. Commands
+    to type, in quotes, stay."""
     parts = re.split(r"('supine [^']*')", text)
     parts[::2] = (re.sub(r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), part)
                   for part in parts[::2])
@@ -296,7 +300,8 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
     made_by = f"supine {_c.string(_c.version())} precompute " + " ".join(
         os.path.basename(word) for word in words({**options, "fields": "fields" if "fields" in options else None}))
     kept = options.pop("output", None)
-    to, error, result = _c.PrecomputeOptions(ctypes.sizeof(_c.PrecomputeOptions)), _c.CError(), ctypes.POINTER(_c.Result)()
+    to = _c.PrecomputeOptions(ctypes.sizeof(_c.PrecomputeOptions))
+    error, result = _c.CError(), ctypes.POINTER(_c.Result)()
     with tempfile.TemporaryDirectory(prefix="supine-") as folder:
         fields = os.path.join(folder, "fields")
         if isinstance(options.get("fields"), tuple):
@@ -306,7 +311,8 @@ def precompute(surfaces: Sequence[Any], options: dict[str, Any], progress: Optio
         arrays = [(np.ascontiguousarray(points), np.ascontiguousarray(corners, "<u4"))
                   for points, corners in (_mesh(*item) for item in meshes)]
         to.lungs.surface_count = len(arrays)
-        to.lungs.surfaces = (_c.Surface * len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
+        to.lungs.surfaces = (_c.Surface *
+                             len(arrays))(*((len(points), points.ctypes.data, len(corners), corners.ctypes.data)
                                                          for points, corners in arrays))
         if not meshes:
             to.lungs.path_count = len(surfaces)

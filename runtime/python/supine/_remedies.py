@@ -23,7 +23,8 @@ WORDS = {
     "labels_side": ". If it is one lung, name the side by labels: {{'left': LABEL}} or {{'right': LABEL}}",
     "labels_exchange": ". Exchange left and right in labels, or correct axes",
     "labels_or_axes": ": if the labels are correct, add axes='{}'",
-    "labels_axes_or_keep": ": if the labels are correct, add axes='{}'; if the header is correct, give its axes by axes",
+    "labels_axes_or_keep": ": if the labels are correct, add axes='{}'; if the header is correct, give its axes "
+                           "by axes",
     "close": ": close=MM closes narrow ones",
     "map_unit": ": leave units out, or give units='mm' to accept any size of the lungs",
     "map_options": ": leave labels, edge, close and surfaces_out out",
@@ -35,14 +36,17 @@ WORDS = {
     "reach": ": give reach=10, or leave soften out",
     "scan_state": ". Change scanned",
     "scan_or_rest": ": change scanned or resting",
-    "scan_fuller": ". If the scan is fuller than scanned says, change scanned or resting; scanned='none' uses the scan as "
+    "scan_fuller": ". If the scan is fuller than scanned says, change scanned or resting; scanned='none' uses the "
+    "scan as "
                    "it is",
     "scan_full_or_rest": ": change full, scanned or resting",
     "scan_not_full": ": give its state by scanned, such as 'supine:rest' or 'full-1000'",
-    "scan_or_rest_give": ": if the scan was not at full inflation, give its state, such as scanned='supine:rest'; otherwise "
+    "scan_or_rest_give": ": if the scan was not at full inflation, give its state, such as scanned='supine:rest'; "
+    "otherwise "
                          "change resting",
     "scan_emptier": " and resting; if the scan was emptier than rest, say so, as in scanned='supine:rest-300'",
-    "scan_over_rest": ": if the scan was fuller than rest, give scanned='full' or 'supine:rest+1000', or change resting",
+    "scan_over_rest": ": if the scan was fuller than rest, give scanned='full' or 'supine:rest+1000', or change "
+                      "resting",
     "scan_give": ", or give the state of this one, such as scanned='supine:rest'",
     "scan_assumed": "; scanned changes this",
     "rest_or_as_is": "; give resting, or take the scan as it is by scanned='none'",
