@@ -15,6 +15,7 @@ const all = [
   'page_targets',
   'page_room',
   'page_views',
+  'page_simplified',
   'page_sizes',
   'accessibility',
   'report',

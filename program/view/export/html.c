@@ -7,7 +7,6 @@
 #include "base/arena.h"
 #include "base/locale.h"
 
-#include "program/options/facts.h"
 #include "program/view/export/export.h"
 #include "program/view/export/packed.h"
 #include "program/view/export/template.h"
@@ -304,12 +303,8 @@ static json_t *describe_surface(const page *p) {
 }
 
 static json_t *describe(const page *p) {
-  char caveats[SUPINE_CAVEATS_SIZE];
-  (void)supine_basis_caveats(p->basis, caveats, sizeof caveats);
   json_t *text = describe_surface(p);
-  json_t *more = json_pack("{s:o, s:s, s:o, s:f, s:o, s:o, s:o, s:o}", "facts",
-                           supine_options_facts(p->basis, false), "caveats", caveats, "colours",
-                           colours(), "breathVolume",
+  json_t *more = json_pack("{s:o, s:f, s:o, s:o, s:o, s:o}", "colours", colours(), "breathVolume",
                            p->shown->breath, "metadata", supine_options_json_metadata(p->basis),
                            "title", supine_options_json_text(p->shown->title), "inside",
                            describe_inside(p), "froms", describe_froms(p));

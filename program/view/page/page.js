@@ -159,7 +159,7 @@ function showFacts(basis) {
     ['surface', `${basis.lungNames.join(' and ')}, ${counted(basis.vertices)} vertices${whole}`],
     ['field', `${basis.modes} ${metadata.modes === 'harmonics' ? 'harmonics' : 'modes'} of band ${basis.band}`],
     ['error', errorOf(basis)],
-    ...basis.facts.map(({ name, line }) => [name, line]),
+    ...basis.library.facts.map(({ name, line }) => [name, line]),
     ['force', metadata.force],
     ['made by', metadata.made_by],
     ['credit', metadata.attribution],

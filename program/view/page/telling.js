@@ -74,7 +74,9 @@ function tellVolumes(moment, { from }) {
   const measured =
     told.depth === 0 && from.name === 'supine at rest' ? PUBLISHED[postureText(state.gravity)] : undefined;
   holds.show(basis, moment.held, told.depth, from.held, lungHeights(state.gravity));
-  const volumes = basis.facts.filter(({ name, source }) => source === 'collapsed' || name.startsWith('volume at rest'));
+  const volumes = basis.library.facts.filter(
+    ({ name, source }) => source === 'collapsed' || name.startsWith('volume at rest'),
+  );
   write('holds-source', volumes.map(({ source, origin }) => `${source} ${origin}`).join('; '));
   const band = basis.metadata.resting_spread ? ' Band: one SD between people.' : '';
   const published = measured ? ` Published change: ${measured}.` : '';
