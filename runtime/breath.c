@@ -131,7 +131,11 @@ static double limb_pressure(const integrated *of, double volume) {
   double high = of->curve.pressure[1];
   for (int step = 0; step < 60; ++step) {
     const double middle = low + 0.5 * (high - low);
-    *(limb_volume(of, middle, NULL) < volume ? &low : &high) = middle;
+    if (limb_volume(of, middle, NULL) < volume) {
+      low = middle;
+    } else {
+      high = middle;
+    }
   }
   return high;
 }
