@@ -66,19 +66,6 @@ supine_status supine_sh_evaluate(size_t band, const double direction[3], double 
   return SUPINE_OK;
 }
 
-supine_status supine_sh_evaluate_many(size_t band, size_t count, const double *directions,
-                                      double *y) {
-  if (band > SUPINE_SH_BAND_MAX) {
-    return SUPINE_ERROR_ARGUMENT;
-  }
-  for (size_t i = 0; i < count; ++i) {
-    if (supine_sh_evaluate(band, directions + 3 * i, y + i * supine_sh_count(band)) != SUPINE_OK) {
-      return SUPINE_ERROR_ARGUMENT;
-    }
-  }
-  return SUPINE_OK;
-}
-
 supine_status supine_sh_evaluate_products(size_t band, size_t order, const double direction[3],
                                           double t, double *products) {
   double polynomial[SUPINE_SH_ORDER_MAX + 1] = {1, t};

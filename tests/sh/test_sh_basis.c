@@ -243,25 +243,4 @@ TEST(test_evaluate_bad_argument_refused) {
   }
   assert_int_equal(supine_sh_evaluate(SUPINE_SH_BAND_MAX, good, y), SUPINE_OK);
   assert_int_equal(supine_sh_evaluate(SUPINE_SH_BAND_MAX + 1, good, y), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_evaluate_many(SUPINE_SH_BAND_MAX + 1, 0, NULL, NULL),
-                   SUPINE_ERROR_ARGUMENT);
-}
-
-TEST(test_evaluate_many_rows_equal_single) {
-  enum { BAND = 6, COUNT = (BAND + 1) * (BAND + 1), DIRECTIONS = 11 };
-  double d[DIRECTIONS][3];
-  double y[DIRECTIONS][COUNT];
-  double expected[COUNT];
-  uint64_t seed = 40961;
-  for (size_t i = 0; i < DIRECTIONS; ++i) {
-    random_direction(&seed, d[i]);
-  }
-  assert_int_equal(supine_sh_evaluate_many(BAND, DIRECTIONS, d[0], y[0]), SUPINE_OK);
-  for (size_t i = 0; i < DIRECTIONS; ++i) {
-    assert_int_equal(supine_sh_evaluate(BAND, d[i], expected), SUPINE_OK);
-    assert_memory_equal(y[i], expected, sizeof expected);
-  }
-  d[DIRECTIONS - 1][1] = NAN;
-  assert_int_equal(supine_sh_evaluate_many(BAND, DIRECTIONS, d[0], y[0]), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_sh_evaluate_many(BAND, 0, NULL, NULL), SUPINE_OK);
 }

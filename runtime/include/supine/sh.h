@@ -42,11 +42,6 @@ SUPINE_API size_t supine_sh_index(size_t l, int m);
  * @retval SUPINE_ERROR_ARGUMENT  the band is too high, or the direction is zero or not finite */
 SUPINE_API supine_status supine_sh_evaluate(size_t band, const double direction[3], double *y);
 
-/** Compute supine_sh_evaluate for `count` directions [count, 3] into y [count, (band + 1)^2].
- * Statuses: as supine_sh_evaluate. */
-SUPINE_API supine_status supine_sh_evaluate_many(size_t band, size_t count,
-                                                 const double *directions, double *y);
-
 /** The highest order of the Chebyshev polynomials. */
 #define SUPINE_SH_ORDER_MAX 7
 
