@@ -6,6 +6,7 @@ const all = [
   'page',
   'page_answer',
   'page_breathing_fields',
+  'page_facts',
   'page_fields',
   'page_hands',
   'page_inside',
