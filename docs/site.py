@@ -7,16 +7,19 @@ Addresses stay the same from build to build:
     live.html              the page lungs.html of the demo, unchanged
     guide/NAME.html        docs/guide/NAME.md
     NAME.html              docs/NAME.md
+    search.js              the texts of all pages, and the search
     reference/index.html   the C headers, which doxygen has written there before
 
-Each page has a column of contents: the guide in the order of its table, then other pages. Only the Markdown that the
-pages use is known: headings, paragraphs, lists, tables, code, links, pictures, bold and italic type. Links to files of
-the repository that are not on the site become plain text."""
+Each page has a column of contents: the guide in the order of its table, then other pages; and a search through all
+pages, whose index is search.js. cmark-gfm reads the Markdown. Links to files of the repository that are not on the site
+become plain text."""
 import html
+import json
 import os
 import posixpath
 import re
 import shutil
+import subprocess
 import sys
 
 source, demo, site = sys.argv[1:4]
@@ -53,6 +56,13 @@ pre code { padding: 0; background: none; font-size: inherit; }
 table { border-collapse: collapse; font-size: 14.5px; }
 th, td { padding: 6px 12px 6px 0; border-bottom: 1px solid var(--line); text-align: left;
   vertical-align: top; overflow-wrap: normal; }
+#search { width: 100%; padding: 6px 10px; border: 1px solid var(--soft); border-radius: 6px; font: inherit; }
+#found li { margin: 8px 0; }
+#found small { display: block; padding: 0 8px; color: var(--soft); }
+summary { padding: 6px 0; font-weight: 600; cursor: pointer; }
+.live a { display: inline-block; padding: 8px 16px; border-radius: 8px; background: var(--link); color: var(--ground);
+  font-weight: 600; text-decoration: none; }
+@media (min-width: 821px) { summary { display: none; } }
 @media (max-width: 820px) {
   #page { display: block; padding: 16px; }
   nav { position: static; max-height: none; margin-bottom: 24px; border-bottom: 1px solid var(--line); }
@@ -80,15 +90,30 @@ def address(path):
     return None
 
 
+def plain(made):
+    return " ".join(html.unescape(re.sub("<[^>]*>", " ", made)).split())
+
+
+def slug(heading):
+    """Return the id of a heading, as GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", html.unescape(re.sub("<[^>]*>", "", heading)).lower()).strip().replace(" ", "-")
+
+
 class Page:
     """A page of Markdown, as HTML with links relative to its address."""
 
     def __init__(self, path):
         self.path, self.address = path, address(path)
-        self.ids = set()
         text = re.sub(r"^\[!\[.*$\n?", "", read(path), flags=re.M)  # badges are about the repository
-        self.title = re.search(r"^# (.*)$", text, re.M)[1]
-        self.body = self.blocks(text.split("\n"))
+        self.title = re.search(r"^# (.*)$", text, re.M)[1].replace("`", "")
+        made = subprocess.run(["cmark-gfm", "--unsafe", "-e", "table"], input=text, capture_output=True, text=True,
+                              check=True).stdout
+        made = re.sub(r'<a href="([^"]*)"( title="[^"]*")?>(.*?)</a>', self.anchor, made, flags=re.S)
+        made = re.sub(r'\b(src|srcset)="([^"]+)"',
+                      lambda found: f'{found[1]}="{self.link(found[2]) or found[2]}"', made)
+        made = re.sub(r"<(h\d)>(.*?)</h\d>",
+                      lambda found: f'<{found[1]} id="{slug(found[2])}">{found[2]}</{found[1]}>', made)
+        self.body = made.replace("<table>", '<div class="table"><table>').replace("</table>", "</table></div>")
 
     def link(self, target):
         """Return the relative address of a link's target; None if it is not on the site."""
@@ -98,101 +123,18 @@ class Page:
         at = address(posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path)))
         return at and self.relative(at) + ("#" + fragment if fragment else "")
 
+    def anchor(self, found):
+        at = self.link(html.unescape(found[1]))
+        return found[3] if at is None else f'<a href="{html.escape(at)}">{found[3]}</a>'
+
     def relative(self, at):
         return posixpath.relpath(at, posixpath.dirname(self.address) or ".")
 
-    def spans(self, text):
-        """Return a line of Markdown as HTML."""
-        codes = []
-
-        def keep(made):
-            codes.append(made)
-            return f"\x00{len(codes) - 1}\x00"
-
-        def anchor(found):
-            at = self.link(found[2])
-            return found[1] if at is None else keep(f'<a href="{html.escape(at)}">') + found[1] + keep("</a>")
-
-        text = re.sub(r"`` ?(.+?) ?``|`([^`]+)`",
-                      lambda found: keep(f"<code>{html.escape(found[1] or found[2])}</code>"), text)
-        text = re.sub(r"!\[([^]]*)\]\(([^)]+)\)", lambda found: keep(
-            f'<img src="{html.escape(self.link(found[2]) or found[2])}" alt="{html.escape(found[1])}">'), text)
-        text = re.sub(r"\[([^]]*)\]\(([^)]+)\)", anchor, text)
-        text = html.escape(text, quote=False)
-        text = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", text)
-        text = re.sub(r"(?<![\w*])\*([^*\s][^*]*)\*(?![\w*])", r"<em>\1</em>", text)
-        while "\x00" in text:
-            text = re.sub("\x00(\\d+)\x00", lambda found: codes[int(found[1])], text)
-        return text
-
-    def heading(self, line):
-        level, text = re.match(r"(#+) (.*)", line).groups()
-        made = re.sub(r"[^\w\- ]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text.lower())).strip().replace(" ", "-")
-        self.ids.add(made)
-        return f'<h{len(level)} id="{made}">{self.spans(text)}</h{len(level)}>'
-
-    def table(self, lines):
-        rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))] for line in lines]
-        made = []
-        for i, row in enumerate(rows):
-            if i != 1:  # the line below the heading
-                tag = "td" if i else "th"
-                made.append("<tr>" + "".join(f"<{tag}>{self.spans(cell)}</{tag}>" for cell in row) + "</tr>")
-        return '<div class="table"><table>' + "\n".join(made) + "</table></div>"
-
-    def items(self, lines):
-        """Return a list. A line that begins neither an item nor a list inside continues the item."""
-        found = []
-        for line in lines:
-            begin = re.match(r"( *)(?:[-*]|\d+\.) +(.*)", line)
-            if begin and not begin[1]:
-                found.append([begin[2], []])
-            elif begin or found[-1][1]:
-                found[-1][1].append(re.sub("^ {1,3}", "", line))
-            else:
-                found[-1][0] += " " + line.strip()
-        tag = "ol" if re.match(r"\d", lines[0]) else "ul"
-        inner = (f"<li>{self.spans(text)}{self.items(below) if below else ''}</li>" for text, below in found)
-        return f"<{tag}>" + "\n".join(inner) + f"</{tag}>"
-
-    def blocks(self, lines):
-        made = []
-        i = 0
-
-        def take(belongs):
-            nonlocal i
-            begin = i
-            while i < len(lines) and belongs(lines[i]):
-                i += 1
-            return lines[begin:i]
-
-        while i < len(lines):
-            line = lines[i]
-            if not line.strip():
-                i += 1
-            elif line.startswith("```"):
-                i += 1
-                made.append("<pre><code>" + html.escape("\n".join(take(lambda at: not at.startswith("```"))),
-                                                        quote=False) + "</code></pre>")
-                i += 1
-            elif line.startswith("#"):
-                made.append(self.heading(line))
-                i += 1
-            elif line.startswith("|"):
-                made.append(self.table(take(lambda at: at.startswith("|"))))
-            elif line.startswith("    "):
-                code = "\n".join(at[4:] for at in take(lambda at: at.startswith("    ") or not at.strip()))
-                made.append("<pre><code>" + html.escape(code.rstrip(), quote=False) + "</code></pre>")
-            elif line.startswith("<"):
-                raw = "\n".join(take(lambda at: bool(at.strip())))
-                made.append(re.sub(r'(src|srcset)="([^"]+)"',
-                                   lambda found: f'{found[1]}="{self.link(found[2]) or found[2]}"', raw))
-            elif re.match(r"([-*]|\d+\.) ", line):
-                made.append(self.items(take(lambda at: bool(at.strip()))))
-            else:
-                made.append("<p>" + self.spans(" ".join(at.strip() for at in take(
-                    lambda at: bool(at.strip()) and not re.match(r"```|#|\||([-*]|\d+\.) ", at)))) + "</p>")
-        return "\n".join(made)
+    def sections(self):
+        """Yield the address, the heading and the text of each section, for the search."""
+        parts = re.split(r'<h\d id="([^"]*)">(.*?)</h\d>', self.body)
+        for at, heading, text in zip(parts[1::3], parts[2::3], parts[3::3]):
+            yield [f"{self.address}#{at}", self.title, plain(heading), plain(text)]
 
     def write(self, contents):
         menu = ""
@@ -202,11 +144,18 @@ class Page:
                             for at, title in entries)
             menu += f"<strong>{heading}</strong><ul>{links}</ul>"
         title = self.title if self.title == "Supine" else f"{self.title} - Supine"
+        live = f'<p class="live"><a href="{self.relative("live.html")}">Turn the lungs yourself</a></p>'
+        body = re.sub("</h1>", lambda _: "</h1>\n" + live, self.body, count=1) if self.title == "Supine" else self.body
+        root = posixpath.relpath(".", posixpath.dirname(self.address) or ".")
         page = (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-                f'<meta name="viewport" content="width=device-width, '
-                f'initial-scale=1">\n<title>{html.escape(title)}</title>\n'
-                f'<link rel="icon" href="data:,">\n<style>{STYLE}</style>\n</head>\n<body>\n<div id="page">\n'
-                f'<nav aria-label="Contents">{menu}</nav>\n<main>\n{self.body}\n</main>\n</div>\n</body>\n</html>\n')
+                f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+                f'<title>{html.escape(title)}</title>\n<link rel="icon" href="data:,">\n<style>{STYLE}</style>\n'
+                f'</head>\n<body>\n<div id="page">\n<nav aria-label="Contents">\n'
+                f'<input id="search" type="search" placeholder="Search" aria-label="Search" hidden>\n'
+                f'<ul id="found" aria-live="polite"></ul>\n'
+                f'<details open><summary>Contents</summary>{menu}</details>\n</nav>\n<main>\n{body}\n</main>\n'
+                f'</div>\n<script>const ROOT = {json.dumps(root + "/")};</script>\n'
+                f'<script src="{self.relative("search.js")}"></script>\n</body>\n</html>\n')
         path = os.path.join(site, self.address)
         os.makedirs(os.path.dirname(path), exist_ok=True)
         with open(path, "w", encoding="utf-8") as file:
@@ -227,6 +176,9 @@ def main():
                  [("reference/index.html", "C headers")])]
     for page in pages:
         page.write(contents)
+    sections = [section for page in pages for section in page.sections()]
+    with open(os.path.join(site, "search.js"), "w", encoding="utf-8") as file:
+        file.write(f"const SECTIONS = {json.dumps(sections, ensure_ascii=False)};\n{read('docs/search.js')}")
     for folder in ("docs", "docs/guide"):
         for name in os.listdir(os.path.join(source, folder)):
             at = address(f"{folder}/{name}")

@@ -2,9 +2,11 @@
 """Check the site that the target `docs` made: test_site.py BUILD_FOLDER
 
 Its addresses are those that site.py promises, each link leads to a file and, in the pages of the guide, to a heading;
-the live page is the demo's own file; no page names a folder of the machine, or has Markdown left."""
+the search leads to headings; the live page is the demo's own file; no page names a folder of the machine, or has
+Markdown left."""
 import filecmp
 import html.parser
+import json
 import os
 import re
 import sys
@@ -71,6 +73,14 @@ for path, page in pages.items():
         text = file.read()
         if os.path.abspath(sys.argv[1]) in text or (not made and "/tmp" in own + text):
             faults.append(f"{own}: names a folder of this machine")
+with open(os.path.join(site, "search.js"), encoding="utf-8") as file:
+    sections = json.loads(file.readline()[len("const SECTIONS = "):].rstrip(";\n"))
+for address, *_ in sections:
+    name, _, heading = address.partition("#")
+    if heading not in pages[os.path.join(site, name)].ids:
+        faults.append(f"the search leads to {address}, which is not there")
+if not any(address.startswith("guide/navigation") and "nodule" in title for address, title, *_ in sections):
+    faults.append("the search does not know where a nodule goes")
 for address in ("index.html", "live.html", "guide/index.html", "guide/navigation.html", "guide/first-lungs.html",
                 "model.html", "accuracy.html", "reference/index.html"):
     if not os.path.exists(os.path.join(site, address)):
