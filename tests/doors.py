@@ -299,7 +299,7 @@ DOORS = [
 ]
 
 # The row of docs/inputs.md that judges a kind of mistake of a type. Without one, it must be told or refused.
-ROWS = {("scan", "person"): "person-depth-least", ("scan", "swapped"): "rest-most",
+ROWS = {("scan", "person"): "one-person", ("scan", "swapped"): "rest-most",
         ("points", "shifted"): "point-outside", ("points", "range"): "point-outside",
         ("points", "axes"): "point-outside",
         ("pairs", "swapped"): "landmarks-order", ("labels", "range"): "label-value",

@@ -190,7 +190,7 @@ def fitted(rest):
                                        "fitted.json")}
 
 
-def paired(*words, mismatched=0):
+def paired(*words, mismatched=0, shift=0.0):
     """Validate a basis by landmarks from the scan to rest."""
     def run():
         place = np.flatnonzero(depth > 8)[::7]
@@ -199,7 +199,7 @@ def paired(*words, mismatched=0):
         second[10:10 + mismatched] = second[-mismatched - 1:-1]
         with open("pairs.csv", "w", encoding="utf-8") as file:
             file.write("x,y,z,to_x,to_y,to_z\n")
-            np.savetxt(file, np.column_stack([first, second]), "%.4f", ",")
+            np.savetxt(file, np.column_stack([first, second]) + [shift, 0, 0, shift, 0, 0], "%.4f", ",")
         return command("validate", "lungs.safetensors", "--landmarks", "pairs.csv", "--to", "supine:rest", *words)
     return {"command": run}
 
@@ -266,14 +266,10 @@ CASES = {
     "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
     "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
     "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),
-    "person-width-least": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
-    "person-width-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1.25, 1, 0.8)), "told"),
-    "person-depth-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 0.7, 1)), "told"),
-    "person-depth-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1.2, 0.85)), "told"),
-    "person-left-least": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 1), 0.65), "told"),
-    "person-left-most": (lambda: scanned((1, 1, 1)), lambda: scanned((1, 1, 0.8), 1.4), "told"),
+    "one-person": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
     "rest-least": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest+1500"), "told"),
     "rest-most": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest-2500"), "told"),
+    "landmarks-outside": (lambda: paired(), lambda: paired(shift=30.0), "told"),
     "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
     "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
     "patient-box": (lambda: made("lungs.ply", patient="patient.json"), lambda: made("high.ply", patient="patient.json"),

@@ -11,9 +11,9 @@
 
 /** Measures of two lungs by which the scans of two people can often be told apart. */
 typedef struct supine_patient_size {
-  double width, depth; /**< of the bounding box, from side to side and from front to back, mm */
-  double volume;       /**< mL */
-  double left;         /**< the left lung's share of the volume */
+  double width, depth, height; /**< of the bounding box, mm */
+  double volume;               /**< mL */
+  double left;                 /**< the left lung's share of the volume */
 } supine_patient_size;
 
 /** Measure lungs. Return false if there are not two of them. */
@@ -22,6 +22,14 @@ bool supine_patient_size_of(const supine_lungs *lungs, supine_patient_size *size
 /** Warn if two scans in one posture differ more than scans of one person do. */
 void supine_patient_check_person(const supine_patient_size *first,
                                  const supine_patient_size *second, supine_findings *findings);
+
+/** Warn if landmarks lie outside the lungs in which they were set: they are another person's,
+ * mirrored, or in other axes.
+ * @param state   names the lungs, such as "first scan"
+ * @param points  [count, 3] mm */
+supine_status supine_patient_check_landmarks(const char *state, const supine_mesh *lungs,
+                                             size_t count, const double *points,
+                                             supine_findings *findings, supine_error *error);
 
 /** Return the standard error of the logarithm of supine_patient_pairs_growth, by leaving out each
  * of 20 groups of pairs. */

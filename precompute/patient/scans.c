@@ -207,6 +207,14 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   SUPINE_TRY(thin(scans, record->from_surface, error));
   if (volume[0] > 0.0 && scans->pairs.count > 0) {
     SUPINE_TRY(find_sides(&scans->lungs[0], &scans->pairs, error));
+    SUPINE_TRY(supine_patient_check_landmarks("first scan", &scans->lungs[0].mesh,
+                                              scans->pairs.count, scans->pairs.from,
+                                              &scans->findings, error));
+  }
+  if (volume[1] > 0.0 && scans->pairs.count > 0) {
+    SUPINE_TRY(supine_patient_check_landmarks("second scan", &scans->lungs[1].mesh,
+                                              scans->pairs.count, scans->pairs.to, &scans->findings,
+                                              error));
   }
   if (named > 0 || (named == 0 && growth > 1.0)) {
     exchange(scans, record->state);

@@ -75,6 +75,16 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
   return supine_posed_positions(s->basis, &outcome->pose, outcome->predicted, error);
 }
 
+supine_status supine_validation_check_landmarks(const supine_validation *subject,
+                                                const supine_patient_pairs *pairs,
+                                                supine_findings *findings, supine_error *error) {
+  if (subject->from.text[0] != '\0') {
+    return SUPINE_OK;
+  }
+  return supine_patient_check_landmarks("basis", &subject->start, pairs->count, pairs->from,
+                                        findings, error);
+}
+
 supine_status supine_validation_check_person(const supine_validation *subject, size_t i,
                                              const supine_lungs *scan, supine_findings *findings,
                                              supine_error *error) {
@@ -92,8 +102,10 @@ supine_status supine_validation_check_person(const supine_validation *subject, s
   SUPINE_TRY(supine_basis_pose(subject->basis, from, &pose, error));
   SUPINE_TRY(supine_basis_volumes(subject->basis, &pose, volumes));
   (void)supine_mesh_box(&subject->start, low, high);
-  size[0] = (supine_patient_size){
-      .width = high[0] - low[0], .depth = high[1] - low[1], .volume = volumes[0] + volumes[1]};
+  size[0] = (supine_patient_size){.width = high[0] - low[0],
+                                  .depth = high[1] - low[1],
+                                  .height = high[2] - low[2],
+                                  .volume = volumes[0] + volumes[1]};
   size[0].left = volumes[0] / size[0].volume;
   supine_patient_check_person(&size[0], &size[1], findings);
   return SUPINE_OK;

@@ -79,6 +79,12 @@ supine_status supine_validation_compare(supine_validation *subject, size_t i,
                                         const supine_mesh *scan, const supine_patient_pairs *pairs,
                                         supine_error *error);
 
+/* Warn if landmarks lie outside the lungs in which the motion starts. Only a scan is compared, as a
+ * predicted surface has an error. */
+supine_status supine_validation_check_landmarks(const supine_validation *subject,
+                                                const supine_patient_pairs *pairs,
+                                                supine_findings *findings, supine_error *error);
+
 /* Warn if the lungs of the scan of state i and those in the state in which the motion starts are
  * hardly of one person (supine_patient_check_person). Scans in another posture, and single lungs,
  * are not compared. */

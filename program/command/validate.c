@@ -127,6 +127,15 @@ static supine_status tell_other_person(const supine_validation *s, size_t i,
   return status;
 }
 
+/* Warn if landmarks hardly are those of the basis. */
+static supine_status tell_landmarks(const supine_validation *s, const supine_patient_pairs *pairs,
+                                    supine_error *error) {
+  supine_findings findings = {.count = 0};
+  const supine_status status = supine_validation_check_landmarks(s, pairs, &findings, error);
+  supine_options_say_findings(name, &findings);
+  return status;
+}
+
 /* Compare state i with its scan, and with the landmarks if it is the first. */
 static supine_status validate_state(const request *wanted, supine_validation *s, size_t i,
                                     supine_error *error) {
@@ -140,6 +149,7 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
   if (landmarks != NULL) {
     SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));
     SUPINE_TRY(supine_options_drop_mismatched(name, landmarks, &pairs, error));
+    SUPINE_TRY(tell_landmarks(s, &pairs, error));
   }
   SUPINE_TRY(supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
                                        landmarks != NULL ? &pairs : NULL, error));
