@@ -41,6 +41,41 @@ double supine_mesh_volume(const supine_mesh *mesh) {
   return sum / 6.0;
 }
 
+double supine_mesh_spread(const supine_mesh *mesh, size_t begin, size_t end, double spread[3]) {
+  double first[3] = {0.0}; /* integrals of x and x^2, from the tetrahedra to the centre of the box */
+  double second[3] = {0.0};
+  double volume = 0.0;
+  double low[3];
+  double high[3];
+  (void)supine_mesh_box(mesh, low, high);
+  const double centre[3] = {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]),
+                            0.5 * (low[2] + high[2])};
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *corner = mesh->triangles + 3 * t;
+    double p[3][3];
+    if (corner[0] < begin || corner[0] >= end) {
+      continue;
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      supine_subtract(mesh->vertices + 3 * (size_t)corner[k], centre, p[k]);
+    }
+    const double tetrahedron = supine_triple(p[0], p[1], p[2]) / 6.0;
+    volume += tetrahedron;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double sum = p[0][axis] + p[1][axis] + p[2][axis];
+      first[axis] += tetrahedron * sum / 4.0;
+      second[axis] += tetrahedron / 20.0 *
+                      (p[0][axis] * p[0][axis] + p[1][axis] * p[1][axis] + p[2][axis] * p[2][axis] +
+                       sum * sum);
+    }
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double mean = first[axis] / volume;
+    spread[axis] = volume > 0.0 ? sqrt(fmax(second[axis] / volume - mean * mean, 0.0)) : 0.0;
+  }
+  return volume;
+}
+
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]) {
   double side = 0.0;
   supine_box_begin(minimum, maximum);

@@ -115,6 +115,14 @@ void supine_mesh_topology_free(supine_topology *topology);
  * is negative if the triangles face inwards, and 0 without triangles. */
 double supine_mesh_volume(const supine_mesh *mesh);
 
+/** Measure what a part of a closed surface encloses: how widely it spreads along each axis. This
+ * hardly depends on single vertices, unlike the bounding box.
+ * @param begin   triangles with first corner begin <= i < end are the part
+ * @param spread  written: standard deviation of x, y and z over the enclosed volume, mm; 0 if the
+ *                volume is not above 0
+ * @return enclosed volume, mm^3 */
+double supine_mesh_spread(const supine_mesh *mesh, size_t begin, size_t end, double spread[3]);
+
 /** Find the axis-aligned bounding box, mm, and return its longest side, mm. All are 0 without
  * vertices. */
 double supine_mesh_box(const supine_mesh *mesh, double minimum[3], double maximum[3]);

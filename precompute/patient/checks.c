@@ -22,13 +22,19 @@ static const double dropped_most = 0.2;  /* largest share of the pairs that are 
 /* A pair that differs by less from its neighbours is not dropped, mm. */
 static const double difference_least = 20.0;
 
-bool supine_patient_size_of(const supine_lungs *lungs, supine_patient_size *size) {
-  *size = (supine_patient_size){.width = lungs->maximum[0] - lungs->minimum[0],
-                                .depth = lungs->maximum[1] - lungs->minimum[1],
-                                .height = lungs->maximum[2] - lungs->minimum[2],
-                                .volume = lungs->volume[0] + lungs->volume[1]};
-  size->left = lungs->volume[0] / size->volume; /* the left lung is lung 0 */
-  return lungs->lung_count == 2;
+void supine_patient_size_add(const supine_mesh *mesh, int side, size_t begin, size_t end,
+                             supine_patient_size *size) {
+  const size_t at = side > 0 ? 0 : 1;
+  size->volume[at] = 1e-3 * supine_mesh_spread(mesh, begin, end, size->spread[at]);
+}
+
+supine_patient_size supine_patient_size_of(const supine_lungs *lungs) {
+  supine_patient_size size = {0};
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    supine_patient_size_add(&lungs->mesh, lungs->side[lung], lungs->lung_begin[lung],
+                            lungs->lung_begin[lung + 1], &size);
+  }
+  return size;
 }
 
 static bool is_told(supine_input_id id, double measured) {
@@ -36,45 +42,69 @@ static bool is_told(supine_input_id id, double measured) {
 }
 
 /* How the measures of one person follow the volume: for each, the line y = slope x through x, the
- * logarithm of emptier / fuller volume. Its SD is that of people's slopes, times x, and `floor`, of
- * repeated scans at one volume and of the surfaces' edges. Sizes are logarithms of emptier / fuller
- * scan; the share of the left lung is a difference. Found by tests/evidence/person.py; the floors
- * are assumed. */
+ * logarithm of emptier / fuller volume of all lungs. Its SD is that of people's slopes, times x, and
+ * `floor`, of repeated scans at one volume. Of the spreads of a lung, y is the logarithm of emptier
+ * / fuller; of the left lung's share of the volume, their difference. Found by
+ * tests/evidence/person.py; the floors are assumed. */
 static const struct {
   const char *measure;
-  double slope, spread, floor;
-} lines[] = {{"width", 0.159, 0.023, 0.015},
-             {"depth", 0.212, 0.054, 0.015},
-             {"height", 0.280, 0.114, 0.015},
-             {"share of the left lung", 0.028, 0.017, 0.011}};
+  double slope, sd, floor;
+} lines[] = {{"width", 0.209, 0.020, 0.015},
+             {"depth", 0.277, 0.056, 0.015},
+             {"height", 0.336, 0.076, 0.015},
+             {"share", 0.029, 0.020, 0.010}};
+enum { SHARE = 3 };
+
+/* The measure that deviates most from its line. */
+typedef struct deviation {
+  size_t line, side;
+  double sds; /* deviation, SD */
+  double measured, expected;
+} deviation;
+
+static void compare_with_line(size_t line, size_t side, double x, double measured,
+                              deviation *worst) {
+  const double expected = lines[line].slope * x;
+  const double sds = fabs(measured - expected) / hypot(lines[line].floor, lines[line].sd * x);
+  if (sds > worst->sds) {
+    *worst = (deviation){line, side, sds, measured, expected};
+  }
+}
+
+static double total(const supine_patient_size *size) {
+  return size->volume[0] + size->volume[1];
+}
 
 void supine_patient_check_person(const supine_patient_size *first,
                                  const supine_patient_size *second, supine_findings *findings) {
-  const bool ordered = first->volume >= second->volume;
+  static const char *const sides[] = {"left", "right"};
+  const bool ordered = total(first) >= total(second);
   const supine_patient_size *fuller = ordered ? first : second;
   const supine_patient_size *emptier = ordered ? second : first;
-  const double x = log(emptier->volume / fuller->volume);
-  const double measured[] = {log(emptier->width / fuller->width),
-                             log(emptier->depth / fuller->depth),
-                             log(emptier->height / fuller->height), emptier->left - fuller->left};
-  size_t worst = 0;
-  double most = 0.0;
-  for (size_t i = 0; i < sizeof lines / sizeof *lines; ++i) {
-    const double sd = hypot(lines[i].floor, lines[i].spread * x);
-    const double deviation = fabs(measured[i] - lines[i].slope * x) / sd;
-    worst = deviation > most ? i : worst;
-    most = fmax(most, deviation);
+  const double x = log(total(emptier) / total(fuller));
+  deviation worst = {.sds = 0.0};
+  for (size_t side = 0; side < 2; ++side) {
+    if ((fuller->volume[side] > 0.0) != (emptier->volume[side] > 0.0)) {
+      return;
+    }
+    for (size_t k = 0; k < 3 && fuller->volume[side] > 0.0; ++k) {
+      compare_with_line(k, side, x, log(emptier->spread[side][k] / fuller->spread[side][k]),
+                        &worst);
+    }
   }
-  if (is_told(SUPINE_INPUT_ONE_PERSON, most)) {
-    const double expected = lines[worst].slope * x;
-    const bool share = worst == 3;
-    supine_findings_warn(
-        findings,
-        "from the fuller to the emptier scan, the %s of the lungs goes to %.0f %%, where %.0f %% "
-        "are expected of one person: are both scans of one person, in one unit?",
-        lines[worst].measure, 100.0 * (share ? emptier->left : exp(measured[worst])),
-        100.0 * (share ? fuller->left + expected : exp(expected)));
+  const double share = fuller->volume[0] / total(fuller);
+  compare_with_line(SHARE, 0, x, emptier->volume[0] / total(emptier) - share, &worst);
+  if (!is_told(SUPINE_INPUT_ONE_PERSON, worst.sds)) {
+    return;
   }
+  const bool is_share = worst.line == SHARE;
+  supine_findings_warn(
+      findings,
+      "from the fuller to the emptier scan, the %s of the %s lung goes to %.0f %%, where %.0f %% "
+      "are expected of one person: are both scans of one person, in one unit?",
+      is_share ? "share of the volume" : lines[worst.line].measure, sides[worst.side],
+      100.0 * (is_share ? share + worst.measured : exp(worst.measured)),
+      100.0 * (is_share ? share + worst.expected : exp(worst.expected)));
 }
 
 supine_status supine_patient_check_landmarks(const char *state, const supine_mesh *lungs,

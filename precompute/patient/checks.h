@@ -9,17 +9,24 @@
 #include "precompute/lungs/lungs.h"
 #include "precompute/patient/pairs.h"
 
-/** Measures of two lungs by which the scans of two people can often be told apart. */
+/** Measures of lungs by which the scans of two people can often be told apart: of the left, then the
+ * right lung; 0 of a lung that is absent. */
 typedef struct supine_patient_size {
-  double width, depth, height; /**< of the bounding box, mm */
-  double volume;               /**< mL */
-  double left;                 /**< the left lung's share of the volume */
+  double volume[2];    /**< mL */
+  double spread[2][3]; /**< supine_mesh_spread from side to side, front to back, up and down, mm */
 } supine_patient_size;
 
-/** Measure lungs. Return false if there are not two of them. */
-bool supine_patient_size_of(const supine_lungs *lungs, supine_patient_size *size);
+/** Measure one lung.
+ * @param side   +1 left, -1 right
+ * @param begin  begin <= vertex < end is the lung */
+void supine_patient_size_add(const supine_mesh *mesh, int side, size_t begin, size_t end,
+                             supine_patient_size *size);
 
-/** Warn if two scans in one posture differ more than scans of one person do. */
+/** Measure lungs. */
+supine_patient_size supine_patient_size_of(const supine_lungs *lungs);
+
+/** Warn if lungs in two scans of one posture hardly show one person. Nothing is told if one scan
+ * has a lung that the other has not. */
 void supine_patient_check_person(const supine_patient_size *first,
                                  const supine_patient_size *second, supine_findings *findings);
 

@@ -117,12 +117,11 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
 
 /* Warn if two scans in one posture hardly show one person. */
 static void warn_of_two_people(supine_patient_scans *scans, const supine_patient_record *record) {
-  supine_patient_size size[2];
-  const bool measured = supine_patient_size_of(&scans->lungs[0], &size[0]) &&
-                        supine_patient_size_of(&scans->lungs[1], &size[1]);
   const bool turned = memcmp(record->state[0].gravity, record->state[1].gravity,
                              sizeof record->state[0].gravity) != 0;
-  if (record->from_surface && measured && !turned) {
+  if (record->from_surface && !turned) {
+    const supine_patient_size size[2] = {supine_patient_size_of(&scans->lungs[0]),
+                                         supine_patient_size_of(&scans->lungs[1])};
     supine_patient_check_person(&size[0], &size[1], &scans->findings);
   }
 }

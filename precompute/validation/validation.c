@@ -76,39 +76,33 @@ static supine_status predict_surface(supine_validation *s, const supine_validati
 }
 
 supine_status supine_validation_check_landmarks(const supine_validation *subject,
+                                                const supine_mesh *scan,
                                                 const supine_patient_pairs *pairs,
                                                 supine_findings *findings, supine_error *error) {
-  if (subject->from.text[0] != '\0') {
-    return SUPINE_OK;
+  if (subject->from.text[0] == '\0') {
+    SUPINE_TRY(supine_patient_check_landmarks("basis", &subject->start, pairs->count, pairs->from,
+                                              findings, error));
   }
-  return supine_patient_check_landmarks("basis", &subject->start, pairs->count, pairs->from,
-                                        findings, error);
+  if (scan != NULL) {
+    SUPINE_TRY(supine_patient_check_landmarks("scan", scan, pairs->count, pairs->to, findings,
+                                              error));
+  }
+  return SUPINE_OK;
 }
 
-supine_status supine_validation_check_person(const supine_validation *subject, size_t i,
-                                             const supine_lungs *scan, supine_findings *findings,
-                                             supine_error *error) {
-  const supine_state *from = &subject->from.state;
-  supine_patient_size size[2] = {0};
-  supine_pose pose;
-  double volumes[SUPINE_LUNGS_MAX] = {0.0};
-  double low[3];
-  double high[3];
-  if (supine_basis_get_info(subject->basis)->lung_count != 2 ||
-      !supine_patient_size_of(scan, &size[1]) ||
-      supine_distance(subject->state[i].state.gravity, from->gravity) >= same_posture) {
-    return SUPINE_OK;
+void supine_validation_check_person(const supine_validation *subject, size_t i,
+                                    const supine_lungs *scan, supine_findings *findings) {
+  const supine_basis_info *info = supine_basis_get_info(subject->basis);
+  supine_patient_size size[2] = {{.volume = {0.0}}, supine_patient_size_of(scan)};
+  if (supine_distance(subject->state[i].state.gravity, subject->from.state.gravity) >=
+      same_posture) {
+    return;
   }
-  SUPINE_TRY(supine_basis_pose(subject->basis, from, &pose, error));
-  SUPINE_TRY(supine_basis_volumes(subject->basis, &pose, volumes));
-  (void)supine_mesh_box(&subject->start, low, high);
-  size[0] = (supine_patient_size){.width = high[0] - low[0],
-                                  .depth = high[1] - low[1],
-                                  .height = high[2] - low[2],
-                                  .volume = volumes[0] + volumes[1]};
-  size[0].left = volumes[0] / size[0].volume;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_patient_size_add(&subject->start, info->lung_names[lung][0] == 'l' ? 1 : -1,
+                            info->lung_begin[lung], info->lung_begin[lung + 1], &size[0]);
+  }
   supine_patient_check_person(&size[0], &size[1], findings);
-  return SUPINE_OK;
 }
 
 typedef struct search {

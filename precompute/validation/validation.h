@@ -79,18 +79,18 @@ supine_status supine_validation_compare(supine_validation *subject, size_t i,
                                         const supine_mesh *scan, const supine_patient_pairs *pairs,
                                         supine_error *error);
 
-/* Warn if landmarks lie outside the lungs in which the motion starts. Only a scan is compared, as a
- * predicted surface has an error. */
+/* Warn if landmarks lie outside the lungs in which the motion starts, or outside the scan in which it
+ * ends. A predicted surface has an error, and is not compared.
+ * @param scan  the surface in that state; NULL if there is none */
 supine_status supine_validation_check_landmarks(const supine_validation *subject,
+                                                const supine_mesh *scan,
                                                 const supine_patient_pairs *pairs,
                                                 supine_findings *findings, supine_error *error);
 
 /* Warn if the lungs of the scan of state i and those in the state in which the motion starts are
- * hardly of one person (supine_patient_check_person). Scans in another posture, and single lungs,
- * are not compared. */
-supine_status supine_validation_check_person(const supine_validation *subject, size_t i,
-                                             const supine_lungs *scan, supine_findings *findings,
-                                             supine_error *error);
+ * hardly of one person (supine_patient_check_person). Scans in another posture are not compared. */
+void supine_validation_check_person(const supine_validation *subject, size_t i,
+                                    const supine_lungs *scan, supine_findings *findings);
 
 /* Fit a line to the best scales of all states whose posture is that of state[0]: best_scale =
  * from_scale + line_slope * (volume - from_millilitres). */

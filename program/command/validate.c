@@ -118,20 +118,19 @@ static supine_status write_errors(const request *wanted, const supine_validation
   return supine_mesh_save(wanted->path, &shown, &save, error);
 }
 
-/* Warn if the scan of state i hardly shows the person of the basis. */
+/* Warn if the scan of state i, or landmarks, hardly are of the person of the basis. */
 static supine_status tell_other_person(const supine_validation *s, size_t i,
-                                       const supine_lungs *lungs, supine_error *error) {
+                                       const supine_lungs *scan, const supine_patient_pairs *pairs,
+                                       supine_error *error) {
   supine_findings findings = {.count = 0};
-  const supine_status status = supine_validation_check_person(s, i, lungs, &findings, error);
-  supine_options_say_findings(name, &findings);
-  return status;
-}
-
-/* Warn if landmarks hardly are those of the basis. */
-static supine_status tell_landmarks(const supine_validation *s, const supine_patient_pairs *pairs,
-                                    supine_error *error) {
-  supine_findings findings = {.count = 0};
-  const supine_status status = supine_validation_check_landmarks(s, pairs, &findings, error);
+  supine_status status = SUPINE_OK;
+  if (scan != NULL) {
+    supine_validation_check_person(s, i, scan, &findings);
+  }
+  if (pairs != NULL) {
+    status = supine_validation_check_landmarks(s, scan != NULL ? &scan->mesh : NULL, pairs,
+                                               &findings, error);
+  }
   supine_options_say_findings(name, &findings);
   return status;
 }
@@ -149,11 +148,11 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
   if (landmarks != NULL) {
     SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));
     SUPINE_TRY(supine_options_drop_mismatched(name, landmarks, &pairs, error));
-    SUPINE_TRY(tell_landmarks(s, &pairs, error));
   }
-  SUPINE_TRY(supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
-                                       landmarks != NULL ? &pairs : NULL, error));
-  return path != NULL ? tell_other_person(s, i, &lungs, error) : SUPINE_OK;
+  SUPINE_TRY(tell_other_person(s, i, path != NULL ? &lungs : NULL,
+                               landmarks != NULL ? &pairs : NULL, error));
+  return supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
+                                   landmarks != NULL ? &pairs : NULL, error);
 }
 
 static supine_status validate(const request *wanted, supine_validation *s, supine_error *error) {

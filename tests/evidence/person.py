@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure how well scans of one person are told from scans of two people, and landmarks from those of others.
 
-    tests/evidence/person.py BUILD COPD
+    tests/evidence/person.py BUILD COPD [LOBES...]
 
 BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, and
-caseNN.csv with landmarks, exhaled then inhaled, mm, LPS. Prints the lines and their spread (precompute/patient/checks.c),
-the deviation of each own pair of scans from the lines of the others, how many pairs of two people deviate by more than
-the limit of docs/inputs.md, and the share of landmarks more than 5 mm outside the lungs of the same and of other people.
+caseNN.csv with landmarks, exhaled then inhaled, mm, LPS. LOBES are label maps of further people. Prints the lines and
+their spread (precompute/patient/checks.c), the deviation of each own pair of scans from the lines of the others, how many
+pairs of two people deviate by more than the limit of docs/inputs.md from the lines of the rest, the same of pairs that are
+scaled to a child's size, of single lungs, and of pairs without the lower part of one lung, and the share of landmarks more
+than 5 mm outside the lungs of the same and of other people.
 Exit code 77: no data."""
 import glob
 import itertools
@@ -19,55 +21,103 @@ import sys
 import tempfile
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-FLOOR, SPREAD, LIMIT = np.array([0.015, 0.015, 0.015, 0.011]), 0.05, 3.5
-NAMES = ("width", "depth", "height", "left")
+# y of the left and the right lung: width, depth, height; and the share of the left lung.
+LINES = {"width": (0, 3), "depth": (1, 4), "height": (2, 5), "left share": (6,)}
+FLOOR, SPREAD, LEAST, LIMIT = np.array([0.015] * 6 + [0.010]), 0.05, 0.02, 3.5
 
 
 def tensors(path):
-    """Read the vertices, triangles and depths of a basis."""
+    """Read the vertices, triangles, lungs and depths of a basis."""
     with open(path, "rb") as file:
         data = file.read()
     size = struct.unpack("<Q", data[:8])[0]
     header = json.loads(data[8:8 + size])
-    kinds = {"F32": "<f4", "U32": "<u4"}
+    kinds = {"F32": "<f4", "U32": "<u4", "U8": "u1"}
     return {name: np.frombuffer(data, kinds[each["dtype"]], int(np.prod(each["shape"])), 8 + size + each["data_offsets"][0])
-            .reshape(each["shape"]) for name, each in header.items() if name in ("vertices", "triangles", "depth")}
+            .reshape(each["shape"]) for name, each in header.items() if name in ("vertices", "triangles", "depth", "lung")}
 
 
-def measure(vertices, triangles):
-    """Return the sizes of the box, the volume and the share of the left lung."""
-    a, b, c = (vertices[triangles[:, k]].astype(float) for k in range(3))
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6000
-    count = len(vertices)
-    edges = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    label = connected_components(coo_matrix((np.ones(len(edges)), edges.T), (count, count)), directed=False)[1]
-    middle = (vertices[:, 0].min() + vertices[:, 0].max()) / 2
-    left = [vertices[label == piece, 0].mean() > middle for piece in range(label.max() + 1)]
-    return (vertices.max(0) - vertices.min(0)).astype(float), volume.sum(), volume[np.array(left)[label[triangles[:, 0]]]].sum() / volume.sum()
+def spread(vertices, triangles):
+    """Return the volume within a closed surface, and the logarithms of its standard deviations along x, y and z."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    part = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    mean = part @ (a + b + c) / 4 / part.sum()
+    square = part @ (a ** 2 + b ** 2 + c ** 2 + (a + b + c) ** 2) / 20 / part.sum()
+    return part.sum() / 1000, np.log(np.sqrt(square - mean ** 2))
+
+
+def measure(basis):
+    """Return the volume of both lungs, and what is compared."""
+    vertices, triangles = basis["vertices"].astype(float), basis["triangles"]
+    (left, first), (right, second) = (spread(vertices - vertices.mean(0), triangles[basis["lung"][triangles[:, 0]] == lung])
+                                      for lung in (0, 1))
+    return left + right, np.r_[first, second, left / (left + right)]
 
 
 def differ(first, second):
     """Return the logarithm of the volume ratio, emptier over fuller, and how the measures differ."""
-    (size, volume, left), (other, smaller, share) = sorted((first, second), key=lambda each: -each[1])
-    return np.log(smaller / volume), np.append(np.log(other / size), share - left)
+    (volume, measures), (smaller, other) = sorted((first, second), key=lambda each: -each[0])
+    return np.log(smaller / volume), other - measures
 
 
-def fit(x, y):
-    """Return the slopes of the lines, and their spread among people."""
-    weight = 1 / (FLOOR[0] ** 2 + (SPREAD * x) ** 2)
-    slope = (weight * x) @ y / (weight @ x ** 2)
-    rest = ((y - np.outer(x, slope)) ** 2).sum(0) * len(x) / (len(x) - 1) - len(x) * FLOOR ** 2
-    return slope, np.sqrt(np.maximum(rest / (x @ x), 0.01 ** 2))
+def fit(own):
+    """Return the slopes of the lines of own pairs, and their spread among people."""
+    x, y = np.array([each[0] for each in own]), np.array([each[1] for each in own])
+    slope, sd = np.zeros(7), np.zeros(7)
+    for columns in map(list, LINES.values()):
+        along, floor = np.tile(x, len(columns)), FLOOR[columns[0]]
+        across, weight = y[:, columns].T.ravel(), 1 / (floor ** 2 + (SPREAD * along) ** 2)
+        slope[columns] = (weight * along) @ across / (weight @ along ** 2)
+        rest = ((across - slope[columns[0]] * along) ** 2).sum() * len(along) / (len(along) - 1) - len(along) * floor ** 2
+        sd[columns] = np.sqrt(max(rest / (along @ along), LEAST ** 2))
+    return slope, sd
 
 
-def deviation(x, y, slope, spread):
-    return np.abs(y - np.multiply.outer(x, slope)) / np.sqrt(FLOOR ** 2 + np.multiply.outer(x, spread) ** 2)
+def deviation(pair, lines):
+    """Return the largest deviation of a pair of scans from lines, SD."""
+    (x, y), (slope, sd) = pair, lines
+    return (np.abs(y - x * slope) / np.hypot(FLOOR, sd * x)).max()
 
 
-def main(build, copd):
+def without_base(basis):
+    """Flatten the lower 30 % of the right lung, which stands for a pair after the same lobe was removed."""
+    vertices, right = basis["vertices"].astype(float), basis["lung"] == 1
+    low, high = vertices[right, 2].min(), vertices[right, 2].max()
+    vertices[right, 2] = np.maximum(vertices[right, 2], low + 0.3 * (high - low))
+    return {**basis, "vertices": vertices}
+
+
+def single(basis, lung):
+    """Return the measures of a lung alone."""
+    vertices, triangles = basis["vertices"].astype(float), basis["triangles"]
+    volume, sizes = spread(vertices - vertices.mean(0), triangles[basis["lung"][triangles[:, 0]] == lung])
+    return volume, np.r_[sizes, sizes, 1.0]
+
+
+def compare(bases, people, further):
+    """Print how pairs of scans deviate from the lines of people who are not in them."""
+    scans = {key: measure(basis) for key, basis in bases.items()}
+    own = {p: differ(scans[p, "insp"], scans[p, "exp"]) for p in people}
+    lines = fit(list(own.values()))
+    without = lambda *names: fit([pair for p, pair in own.items() if p not in names])
+    print("lines:", *(f"{name} {lines[0][c[0]]:.3f} ({lines[1][c[0]]:.3f})" for name, c in LINES.items()))
+    show = lambda title, change: print(title, *(f"{deviation(change(p), without(p)):.1f}" for p in people))
+    show("own pairs, SD:", own.get)
+    show("own pairs without the base of a lung:", lambda p: differ(*(measure(without_base(bases[p, s])) for s in ("insp", "exp"))))
+    for lung in (0, 1):
+        show("single lungs:", lambda p, k=lung: differ(*(single(bases[p, s], k) for s in ("insp", "exp"))))
+    scaled = lambda basis, by: {**basis, "vertices": basis["vertices"] * np.float32(by)}
+    show("own pairs scaled to 0.6:", lambda p: differ(*(measure(scaled(bases[p, s], 0.6)) for s in ("insp", "exp"))))
+    show("scans 3 % apart:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "insp"], 0.97 ** (1 / 3)))))
+    show("one scan 10 % thicker in z:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "insp"], [1, 1, 1.1]))))
+    show("the exhaled scan 10 % thicker in z:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "exp"], [1, 1, 1.1]))))
+    keys = list(scans)
+    wrong = [deviation(differ(scans[a], scans[b]), without(a[0], b[0])) for a, b in itertools.combinations(keys, 2) if a[0] != b[0]]
+    print(f"two people ({len(people)} and {len(further)}): {sum(each > LIMIT for each in wrong)} of {len(wrong)} above {LIMIT} SD")
+
+
+def main(build, copd, *lobes):
     supine = os.path.abspath(os.path.join(build, "supine"))
     people = sorted(os.path.basename(path)[:-4] for path in glob.glob(copd + "/case*.csv"))
     if not people or not os.path.exists(supine):
@@ -81,23 +131,15 @@ def main(build, copd):
             run("embed", basis, "points.csv", "--clamp", "-o", "inside.safetensors")
             return (tensors(folder + "/inside.safetensors")["depth"] < -5).mean()
 
-        scans = {}
-        for person, state in itertools.product(people, ("exp", "insp")):
+        def basis(path, name, *words):
             # the scan is the reference of the law `paper`, so that the basis has its surface
-            run("precompute", f"{os.path.abspath(copd)}/{person}_{state}.nii.gz", "--edge", "6", "--law", "paper", "--band", "3",
-                "--held-out", "5", "-o", f"{person}_{state}.safetensors")
-            basis = tensors(f"{folder}/{person}_{state}.safetensors")
-            scans[person, state] = measure(basis["vertices"], basis["triangles"])
-        x, y = (np.array(part) for part in zip(*(differ(scans[p, "insp"], scans[p, "exp"]) for p in people)))
-        slope, spread = fit(x, y)
-        print("lines:", *(f"{name} {s:.3f} ({q:.3f})" for name, s, q in zip(NAMES, slope, spread)))
-        others = [np.arange(len(x)) != i for i in range(len(x))]
-        own = [deviation(x[i], y[i], *fit(x[keep], y[keep])).max() for i, keep in enumerate(others)]
-        print("own pairs, of the lines of the others, SD:", *(f"{each:.1f}" for each in own))
-        pairs = [((a, "insp"), (b, "exp")) for a, b in itertools.permutations(people, 2)]
-        pairs += [((a, state), (b, state)) for state in ("exp", "insp") for a, b in itertools.combinations(people, 2)]
-        wrong = [deviation(*differ(scans[a], scans[b]), slope, spread).max() for a, b in pairs]
-        print(f"two people: {sum(each > LIMIT for each in wrong)} of {len(wrong)} above {LIMIT} SD")
+            run("precompute", os.path.abspath(path), "--edge", "6", "--law", "paper", "--band", "3", "--held-out", "5", *words,
+                "-o", name)
+            return tensors(f"{folder}/{name}")
+
+        bases = {(p, s): basis(f"{copd}/{p}_{s}.nii.gz", f"{p}_{s}.safetensors") for p in people for s in ("exp", "insp")}
+        bases.update({(path, ""): basis(path, "further.safetensors", "--labels", "lobes") for path in lobes})
+        compare(bases, people, lobes)
         for state, columns in (("exp", slice(0, 3)), ("insp", slice(3, 6))):
             marks = {p: np.genfromtxt(f"{copd}/{p}.csv", delimiter=",", skip_header=1)[:, columns] for p in people}
             share = np.array([[outside(marks[p], f"{q}_{state}.safetensors") for p in people] for q in people])
@@ -108,6 +150,6 @@ def main(build, copd):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
+    if len(sys.argv) < 3:
         sys.exit(__doc__)
     main(*sys.argv[1:])

@@ -66,6 +66,38 @@ TEST(test_volume_torus_far_from_origin_closed_form) {
   supine_mesh_free(&torus);
 }
 
+/* Points spread evenly over a length a have the standard deviation a / sqrt(12). */
+TEST(test_spread_of_each_of_two_boxes_closed_form) {
+  supine_mesh box = sample_box();
+  double low[3];
+  double high[3];
+  double spread[3];
+  (void)supine_mesh_box(&box, low, high);
+  const size_t n = box.vertex_count;
+  const size_t m = box.triangle_count;
+  static double vertices[2 * 3 * 64];
+  static uint32_t triangles[2 * 3 * 64];
+  for (size_t i = 0; i < 6 * n; ++i) { /* the second box is half as large, and elsewhere */
+    const size_t k = i % (3 * n);
+    vertices[i] = i < 3 * n ? box.vertices[k] : 0.5 * box.vertices[k] - 700.0;
+  }
+  for (size_t i = 0; i < 6 * m; ++i) {
+    triangles[i] = box.triangles[i % (3 * m)] + (uint32_t)(i < 3 * m ? 0 : n);
+  }
+  supine_mesh both = sample_make(2 * n, vertices, 2 * m, triangles);
+  for (size_t part = 0; part < 2; ++part) {
+    const double size = part == 0 ? 1.0 : 0.5;
+    const double volume = supine_mesh_spread(&both, part * n, (part + 1) * n, spread);
+    assert_close(volume, 1430000.0 * size * size * size, rounding(12, 1.0e9));
+    for (size_t k = 0; k < 3; ++k) {
+      assert_close(spread[k], size * (high[k] - low[k]) / sqrt(12.0), rounding(12, 1.0e6));
+    }
+  }
+  assert_true(supine_mesh_spread(&both, 2 * n, 3 * n, spread) == 0.0 && spread[0] == 0.0);
+  supine_mesh_free(&both);
+  supine_mesh_free(&box);
+}
+
 TEST(test_box_literal) {
   supine_mesh box = sample_box();
   double minimum[3];
