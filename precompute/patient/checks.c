@@ -87,9 +87,11 @@ void supine_patient_check_person(const supine_patient_size *first,
     if ((fuller->volume[side] > 0.0) != (emptier->volume[side] > 0.0)) {
       return;
     }
-    for (size_t k = 0; k < 3 && fuller->volume[side] > 0.0; ++k) {
-      compare_with_line(k, side, x, log(emptier->spread[side][k] / fuller->spread[side][k]),
-                        &worst);
+    if (fuller->volume[side] > 0.0) {
+      for (size_t k = 0; k < 3; ++k) {
+        const double ratio = emptier->spread[side][k] / fuller->spread[side][k];
+        compare_with_line(k, side, x, log(ratio), &worst);
+      }
     }
   }
   const double share = fuller->volume[0] / total(fuller);

@@ -115,14 +115,16 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   }
 }
 
-/* Warn if two scans in one posture hardly show one person. */
-static void warn_of_two_people(supine_patient_scans *scans, const supine_patient_record *record) {
-  const bool turned = memcmp(record->state[0].gravity, record->state[1].gravity,
-                             sizeof record->state[0].gravity) != 0;
-  if (record->from_surface && !turned) {
-    const supine_patient_size size[2] = {supine_patient_size_of(&scans->lungs[0]),
-                                         supine_patient_size_of(&scans->lungs[1])};
-    supine_patient_check_person(&size[0], &size[1], &scans->findings);
+/* Warn if two scans, of which one may have no surface, hardly show one person in one posture. */
+static void warn_of_two_people(const supine_lungs *first, const supine_state *first_state,
+                               const supine_lungs *second, const supine_state *second_state,
+                               supine_findings *findings) {
+  const bool turned =
+      memcmp(first_state->gravity, second_state->gravity, sizeof first_state->gravity) != 0;
+  if (first->mesh.vertex_count > 0 && second->mesh.vertex_count > 0 && !turned) {
+    const supine_patient_size size[2] = {supine_patient_size_of(first),
+                                         supine_patient_size_of(second)};
+    supine_patient_check_person(&size[0], &size[1], findings);
   }
 }
 
@@ -145,7 +147,8 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
   complete_state(record, 1);
   name_volumes(scans, record);
   warn_of_rest(scans, record);
-  warn_of_two_people(scans, record);
+  warn_of_two_people(&scans->lungs[0], &record->state[0], emptier, &record->state[1],
+                     &scans->findings);
   memcpy(record->emptier[0], record->from_surface ? emptier->minimum : frame.minimum,
          sizeof record->emptier[0]);
   memcpy(record->emptier[1], record->from_surface ? emptier->maximum : frame.maximum,
@@ -284,11 +287,13 @@ supine_status supine_patient_scans_fit_further_landmarks(
 
 supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
                                                        const supine_state *state, bool scans_moved,
-                                                       const supine_mesh *surface,
+                                                       const supine_lungs *scan,
                                                        supine_patient_record *record,
                                                        supine_error *error) {
   supine_lungs *from = &scans->lungs[0];
   supine_patient_further *further = append(record, state);
+  const size_t other = from->mesh.vertex_count > 0 ? 0 : 1;
+  warn_of_two_people(&scans->lungs[other], &record->state[other], scan, state, &scans->findings);
   if (from->mesh.vertex_count == 0) {
     /* The fuller scan has no surface: move that of the emptier one to the fuller state. */
     *from = scans->lungs[1];
@@ -296,5 +301,5 @@ supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *sca
     supine_patient_points_to_fuller(&record->patient, from->mesh.vertex_count, from->mesh.vertices);
     supine_lungs_measure(from);
   }
-  return supine_patient_gain_fit_surface(record, from, surface, scans_moved, further, error);
+  return supine_patient_gain_fit_surface(record, from, &scan->mesh, scans_moved, further, error);
 }

@@ -46,10 +46,11 @@ supine_status supine_patient_scans_fit_further_landmarks(
     supine_patient_pairs *pairs, supine_patient_record *record, supine_error *error);
 
 /** Fit the surface of a further scan by supine_patient_gain_fit_surface, and append the result to
- * the record. Call supine_patient_scans_fit first. */
+ * the record. Warn in scans->findings if the further scan hardly is of the same person as the scan in
+ * the same posture. Call supine_patient_scans_fit first. */
 supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
                                                        const supine_state *state, bool scans_moved,
-                                                       const supine_mesh *surface,
+                                                       const supine_lungs *scan,
                                                        supine_patient_record *record,
                                                        supine_error *error);
 

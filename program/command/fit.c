@@ -156,7 +156,7 @@ static supine_status fit_further(const request *wanted, size_t which, supine_pat
   }
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
   SUPINE_TRY(supine_options_load_lungs(name, path, &wanted->source, &lungs, error));
-  return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs.mesh,
+  return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs,
                                                   record, error);
 }
 
@@ -203,9 +203,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
   supine_options_say_findings(name, &scans.findings);
   SUPINE_TRY(supine_patient_scans_fit(&scans, &options, wanted->expandability, &record, error));
+  scans.findings.count = 0; /* said above */
   for (size_t k = 0; k < wanted->further_count; ++k) {
     SUPINE_TRY(fit_further(wanted, k, &scans, &record, error));
   }
+  supine_options_say_findings(name, &scans.findings);
   supine_patient_gain_set(&record);
   if (wanted->map != NULL) {
     SUPINE_TRY(

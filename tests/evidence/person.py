@@ -6,10 +6,10 @@
 
 BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, and
 caseNN.csv with landmarks, exhaled then inhaled, mm, LPS. LOBES are label maps of further people. Prints the lines and
-their spread (precompute/patient/checks.c), the deviation of each own pair of scans from the lines of the others, how many
-pairs of two people deviate by more than the limit of docs/inputs.md from the lines of the rest, the same of pairs that are
-scaled to a child's size, of single lungs, and of pairs without the lower part of one lung, and the share of landmarks more
-than 5 mm outside the lungs of the same and of other people.
+their spread (precompute/patient/checks.c); the deviation of each own pair of scans from the lines of the others; how
+many pairs of two people deviate by more than the limit of docs/inputs.md from the lines of the rest; the same of own
+pairs that are scaled to a child's size, of single lungs, of pairs without the lower part of one lung, and of scans that
+are thicker than they were; and the share of landmarks more than 5 mm outside the lungs of the same and of other people.
 Exit code 77: no data."""
 import glob
 import itertools
@@ -34,8 +34,12 @@ def tensors(path):
     size = struct.unpack("<Q", data[:8])[0]
     header = json.loads(data[8:8 + size])
     kinds = {"F32": "<f4", "U32": "<u4", "U8": "u1"}
-    return {name: np.frombuffer(data, kinds[each["dtype"]], int(np.prod(each["shape"])), 8 + size + each["data_offsets"][0])
-            .reshape(each["shape"]) for name, each in header.items() if name in ("vertices", "triangles", "depth", "lung")}
+    found = {}
+    for name in ("vertices", "triangles", "depth", "lung"):
+        if name in header:
+            kind, shape, at = (header[name][key] for key in ("dtype", "shape", "data_offsets"))
+            found[name] = np.frombuffer(data, kinds[kind], int(np.prod(shape)), 8 + size + at[0]).reshape(shape)
+    return found
 
 
 def spread(vertices, triangles):
@@ -50,8 +54,8 @@ def spread(vertices, triangles):
 def measure(basis):
     """Return the volume of both lungs, and what is compared."""
     vertices, triangles = basis["vertices"].astype(float), basis["triangles"]
-    (left, first), (right, second) = (spread(vertices - vertices.mean(0), triangles[basis["lung"][triangles[:, 0]] == lung])
-                                      for lung in (0, 1))
+    sides = [triangles[basis["lung"][triangles[:, 0]] == lung] for lung in (0, 1)]
+    (left, first), (right, second) = (spread(vertices - vertices.mean(0), side) for side in sides)
     return left + right, np.r_[first, second, left / (left + right)]
 
 
@@ -69,8 +73,8 @@ def fit(own):
         along, floor = np.tile(x, len(columns)), FLOOR[columns[0]]
         across, weight = y[:, columns].T.ravel(), 1 / (floor ** 2 + (SPREAD * along) ** 2)
         slope[columns] = (weight * along) @ across / (weight @ along ** 2)
-        rest = ((across - slope[columns[0]] * along) ** 2).sum() * len(along) / (len(along) - 1) - len(along) * floor ** 2
-        sd[columns] = np.sqrt(max(rest / (along @ along), LEAST ** 2))
+        n, rest = len(along), across - slope[columns[0]] * along
+        sd[columns] = np.sqrt(max((rest @ rest * n / (n - 1) - n * floor ** 2) / (along @ along), LEAST ** 2))
     return slope, sd
 
 
@@ -104,17 +108,19 @@ def compare(bases, people, further):
     print("lines:", *(f"{name} {lines[0][c[0]]:.3f} ({lines[1][c[0]]:.3f})" for name, c in LINES.items()))
     show = lambda title, change: print(title, *(f"{deviation(change(p), without(p)):.1f}" for p in people))
     show("own pairs, SD:", own.get)
-    show("own pairs without the base of a lung:", lambda p: differ(*(measure(without_base(bases[p, s])) for s in ("insp", "exp"))))
+    changed = lambda p, first, second=None: differ(first(bases[p, "insp"]), (second or first)(bases[p, "exp"]))
+    scaled = lambda by: lambda basis: measure({**basis, "vertices": basis["vertices"] * np.float32(by)})
+    show("own pairs without the base of a lung:", lambda p: changed(p, lambda basis: measure(without_base(basis))))
     for lung in (0, 1):
-        show("single lungs:", lambda p, k=lung: differ(*(single(bases[p, s], k) for s in ("insp", "exp"))))
-    scaled = lambda basis, by: {**basis, "vertices": basis["vertices"] * np.float32(by)}
-    show("own pairs scaled to 0.6:", lambda p: differ(*(measure(scaled(bases[p, s], 0.6)) for s in ("insp", "exp"))))
-    show("scans 3 % apart:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "insp"], 0.97 ** (1 / 3)))))
-    show("one scan 10 % thicker in z:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "insp"], [1, 1, 1.1]))))
-    show("the exhaled scan 10 % thicker in z:", lambda p: differ(scans[p, "insp"], measure(scaled(bases[p, "exp"], [1, 1, 1.1]))))
-    keys = list(scans)
-    wrong = [deviation(differ(scans[a], scans[b]), without(a[0], b[0])) for a, b in itertools.combinations(keys, 2) if a[0] != b[0]]
-    print(f"two people ({len(people)} and {len(further)}): {sum(each > LIMIT for each in wrong)} of {len(wrong)} above {LIMIT} SD")
+        show("single lungs:", lambda p, lung=lung: changed(p, lambda basis: single(basis, lung)))
+    show("own pairs scaled to 0.6:", lambda p: changed(p, scaled(0.6)))
+    show("the exhaled scan 10 % thicker in z:", lambda p: changed(p, measure, scaled([1, 1, 1.1])))
+    show("scans 3 % apart:", lambda p: differ(scans[p, "insp"], scaled(0.97 ** (1 / 3))(bases[p, "insp"])))
+    show("the same scan 10 % thicker in z:", lambda p: differ(scans[p, "insp"], scaled([1, 1, 1.1])(bases[p, "insp"])))
+    pairs = [(a, b) for a, b in itertools.combinations(scans, 2) if a[0] != b[0]]
+    wrong = [deviation(differ(scans[a], scans[b]), without(a[0], b[0])) for a, b in pairs]
+    above = sum(each > LIMIT for each in wrong)
+    print(f"two people ({len(people)} and {len(further)}): {above} of {len(wrong)} above {LIMIT} SD")
 
 
 def main(build, copd, *lobes):
@@ -133,20 +139,21 @@ def main(build, copd, *lobes):
 
         def basis(path, name, *words):
             # the scan is the reference of the law `paper`, so that the basis has its surface
-            run("precompute", os.path.abspath(path), "--edge", "6", "--law", "paper", "--band", "3", "--held-out", "5", *words,
-                "-o", name)
+            fast = ("--edge", "6", "--law", "paper", "--band", "3", "--held-out", "5")
+            run("precompute", os.path.abspath(path), *fast, *words, "-o", name)
             return tensors(f"{folder}/{name}")
 
-        bases = {(p, s): basis(f"{copd}/{p}_{s}.nii.gz", f"{p}_{s}.safetensors") for p in people for s in ("exp", "insp")}
+        bases = {(p, s): basis(f"{copd}/{p}_{s}.nii.gz", f"{p}_{s}.safetensors")
+                 for p, s in itertools.product(people, ("exp", "insp"))}
         bases.update({(path, ""): basis(path, "further.safetensors", "--labels", "lobes") for path in lobes})
         compare(bases, people, lobes)
         for state, columns in (("exp", slice(0, 3)), ("insp", slice(3, 6))):
             marks = {p: np.genfromtxt(f"{copd}/{p}.csv", delimiter=",", skip_header=1)[:, columns] for p in people}
             share = np.array([[outside(marks[p], f"{q}_{state}.safetensors") for p in people] for q in people])
             same = np.eye(len(people), dtype=bool)
-            print(f"{state}: share of landmarks outside: own at most {share[same].max():.3f}, others "
-                  f"{share[~same].min():.3f} to {share[~same].max():.3f}, above 0.005 in {(share[~same] > 0.005).sum()} "
-                  f"of {(~same).sum()}")
+            others = share[~same]
+            print(f"{state}: share of landmarks outside: own at most {share[same].max():.3f}, of others "
+                  f"{others.min():.3f} to {others.max():.3f}, above 0.005 in {(others > 0.005).sum()} of {len(others)}")
 
 
 if __name__ == "__main__":
