@@ -77,25 +77,34 @@ static double run_of(const reading *r, size_t row) {
   return r->gravity->shape[1] == 4 ? number_at(r->gravity, 4 * row + 3) : (double)row;
 }
 
-/* Find the row of gravity of each row of displacement: the row of the same run. */
-static supine_status match_runs(const reading *r) {
+/* Find the row of gravity of a row of displacement: the row of the same run. */
+static supine_status match_run(const reading *r, size_t d) {
   const size_t rows = r->gravity->shape[0];
-  for (size_t d = 0; d < r->fields.run_count; ++d) {
-    const double wanted = r->run != NULL ? number_at(r->run, d) : (double)d;
-    size_t found = rows;
-    r->gravity_row[d] = d;
-    for (size_t row = 0; r->run != NULL && row < rows; ++row) {
-      if (run_of(r, row) == wanted) {
-        SUPINE_REFUSE_IF(found < rows, r->error, SUPINE_ERROR_FORMAT,
-                         "%s: rows %zu and %zu of gravity are both of run %g: number each run once",
-                         r->path, found, row, wanted);
-        r->gravity_row[d] = found = row;
-      }
+  const double wanted = number_at(r->run, d);
+  size_t found = rows;
+  for (size_t row = 0; row < rows; ++row) {
+    if (run_of(r, row) == wanted) {
+      SUPINE_REFUSE_IF(found < rows, r->error, SUPINE_ERROR_FORMAT,
+                       "%s: rows %zu and %zu of gravity are both of run %g: number each run once",
+                       r->path, found, row, wanted);
+      found = row;
     }
-    SUPINE_REFUSE_IF(r->run != NULL && found == rows, r->error, SUPINE_ERROR_FORMAT,
-                     "%s: row %zu of displacement is of run %g, but gravity has no such run: give "
-                     "the column 'run' of the plan with both",
-                     r->path, d, wanted);
+  }
+  SUPINE_REFUSE_IF(found == rows, r->error, SUPINE_ERROR_FORMAT,
+                   "%s: row %zu of displacement is of run %g, but gravity has no such run: give "
+                   "the column 'run' of the plan with both",
+                   r->path, d, wanted);
+  r->gravity_row[d] = found;
+  return SUPINE_OK;
+}
+
+/* Find the rows of gravity of all rows of displacement, which have the same order without runs. */
+static supine_status match_runs(const reading *r) {
+  for (size_t d = 0; d < r->fields.run_count; ++d) {
+    r->gravity_row[d] = d;
+    if (r->run != NULL) {
+      SUPINE_TRY(match_run(r, d));
+    }
   }
   return SUPINE_OK;
 }
