@@ -211,7 +211,7 @@ for (const gravity of [
           const down = downOf(g);
           const { centre, half } = b.torso;
           const body = [
-            ...torsoRings().map(([, x, y]) => Math.hypot(x * half[0] * down[0], y * half[1] * down[1])),
+            ...torsoRings(b.torso).map(([, x, y]) => Math.hypot(x * half[0] * down[0], y * half[1] * down[1])),
             ...armsOf(b.torso, down)
               .flat()
               .map(([x, y, , r]) => x * down[0] + y * down[1] + r),

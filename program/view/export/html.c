@@ -278,10 +278,10 @@ static json_t *describe_froms(const page *p) {
     const supine_options_reference_pose *from = &p->shown->from[i];
     char state[160];
     (void)supine_state_print(&from->state, state, sizeof state);
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:o, s:o}", "name", from->name, "gravity",
-                        supine_options_json_numbers(3, from->state.gravity), "state",
-                        from->scan ? json_null() : json_string(state)));
+    (void)json_array_append_new(list,
+                                json_pack("{s:s, s:o, s:o}", "name", from->name, "gravity",
+                                          supine_options_json_numbers(3, from->state.gravity),
+                                          "state", from->scan ? json_null() : json_string(state)));
   }
   return list;
 }
@@ -289,25 +289,35 @@ static json_t *describe_froms(const page *p) {
 /* Describe the vertices, modes and lungs of the surface as the page stores them. */
 static json_t *describe_surface(const page *p) {
   const supine_basis_info *info = p->info;
-  return json_pack(
-      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:f, s:o}", "vertices",
-      (json_int_t)p->order.vertex_count, "wholeVertices", (json_int_t)info->vertex_count,
-      "triangles", (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
-      (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count, "band",
-      (json_int_t)info->band, "order", (json_int_t)info->order, "vector", (int)info->vector,
-      "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
-      begins(info, p->order.corner_begin), "hasRest", (int)info->has_rest, "middle",
-      supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
-      p->coefficient_step, "references",
-      supine_options_json_numbers(info->lung_count, info->reference_volume));
+  return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:f, s:o}",
+                   "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
+                   (json_int_t)info->vertex_count, "triangles",
+                   (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
+                   (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count,
+                   "band", (json_int_t)info->band, "order", (json_int_t)info->order, "vector",
+                   (int)info->vector, "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
+                   begins(info, p->order.corner_begin), "hasRest", (int)info->has_rest, "middle",
+                   supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
+                   p->coefficient_step, "references",
+                   supine_options_json_numbers(info->lung_count, info->reference_volume));
+}
+
+/* Return the outline of the torso that the page draws, as pictures do. */
+static json_t *describe_torso(void) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < SUPINE_RENDER_SECTIONS; ++i) {
+    (void)json_array_append_new(list, supine_options_json_numbers(3, supine_render_torso(i)));
+  }
+  return list;
 }
 
 static json_t *describe(const page *p) {
   json_t *text = describe_surface(p);
-  json_t *more = json_pack("{s:o, s:f, s:o, s:o, s:o, s:o}", "colours", colours(), "breathVolume",
-                           p->shown->breath, "metadata", supine_options_json_metadata(p->basis),
-                           "title", supine_options_json_text(p->shown->title), "inside",
-                           describe_inside(p), "froms", describe_froms(p));
+  json_t *more = json_pack("{s:o, s:f, s:o, s:o, s:o, s:o, s:o}", "colours", colours(),
+                           "breathVolume", p->shown->breath, "outline", describe_torso(),
+                           "metadata", supine_options_json_metadata(p->basis), "title",
+                           supine_options_json_text(p->shown->title), "inside", describe_inside(p),
+                           "froms", describe_froms(p));
   (void)json_object_update_missing(text, more);
   json_decref(more);
   return text;

@@ -202,7 +202,7 @@ function findBoxes(basis) {
     [low[0], high[0]] = [Math.min(low[0], -high[0]), Math.max(high[0], -low[0])]; // room for the other lung
   }
   const centre = low.map((x, i) => (x + high[i]) / 2);
-  basis.torso = { ...box, centre, half: low.map((x, i) => (high[i] - x) / 2) };
+  basis.torso = { ...box, centre, half: low.map((x, i) => (high[i] - x) / 2), outline: basis.outline };
 }
 
 /** Read the lungs from the page, and open them with the run-time library. */

@@ -2,28 +2,8 @@
 // Shape of the patient's body, which is only drawn: a torso around the lungs, and arms that lie on the table. If the
 // patient lies on a side, the lower arm is raised, and the upper one lies along the body.
 
-/** Outline of the torso: height of the section's centre above the centre of the lungs, and its half widths to the sides
- * and to front and back, as multiples of half the lungs' extent along each axis. */
-const TORSO = [
-  [-4.4, 1.2, 1.16],
-  [-3, 1.2, 1.14],
-  [-2, 1.1, 1.08],
-  [-1, 1.16, 1.18],
-  [0, 1.3, 1.22],
-  [0.6, 1.45, 1.14],
-  [1, 1.42, 0.94],
-  [1.25, 0.95, 0.72],
-  [1.45, 0.44, 0.54],
-  [1.7, 0.4, 0.52],
-  [1.92, 0.46, 0.7],
-  [2.3, 0.56, 0.84],
-  [2.65, 0.52, 0.78],
-  [2.9, 0.34, 0.5],
-  [3, 0.001, 0.001],
-];
-
-/** Points of the left arm from the shoulder to the fingers, in the same units, beside the body and raised beside the
- * head, and the arm's radius there, in half widths of the lungs. */
+/** Points of the left arm from the shoulder to the fingers, in the units of the torso's outline, beside the body and
+ * raised beside the head, and the arm's radius there, in half widths of the lungs. */
 const ARM = {
   beside: [
     [1.2, 0, 0.72],
@@ -68,8 +48,8 @@ function downOf(gravity) {
 
 /** Return the points of both arms, from shoulder to fingers, relative to the centre of the torso, and their radii:
  * rows of x, y, z, radius, mm. An arm beside the body lies on the table. */
-function armsOf({ half }, down) {
-  const deepest = Math.max(...TORSO.map(([, , y]) => y)) * half[1];
+function armsOf({ half, outline }, down) {
+  const deepest = Math.max(...outline.map(([, , y]) => y)) * half[1];
   // 0: beside the body, 1: raised
   const raised = (side) => (down ? Math.min(1, Math.max(0, (side * down[0] - 0.4) / 0.5)) : 0);
   return [1, -1].map((side) =>
@@ -85,12 +65,13 @@ function armsOf({ half }, down) {
   );
 }
 
-/** Return the sections of the torso: rows of TORSO, and others between them. */
-const torsoRings = () => smooth(TORSO, 6);
+/** Return the sections of the torso: rows of its outline, and others between them. */
+const torsoRings = ({ outline }) => smooth(outline, 6);
 
 /** Return how far the body reaches down from the centre of the torso, mm. */
-function reachDown({ half }, arms, down) {
-  const rings = torsoRings().map(([, x, y]) => Math.hypot(x * half[0] * down[0], y * half[1] * down[1]));
+function reachDown(torso, arms, down) {
+  const { half } = torso;
+  const rings = torsoRings(torso).map(([, x, y]) => Math.hypot(x * half[0] * down[0], y * half[1] * down[1]));
   return Math.max(...rings, ...arms.flat().map(([x, y, , radius]) => x * down[0] + y * down[1] + radius));
 }
 

@@ -60,7 +60,7 @@ class Solids extends Surfaces {
     ]);
   }
 
-  /** Return the vertex array, indices and their count of the patient's body, a tube of the half widths in TORSO. */
+  /** Return the vertex array, indices and their count of the patient's body, a tube of its outline. */
   makeTorso() {
     const {
       gl,
@@ -69,7 +69,7 @@ class Solids extends Surfaces {
       },
     } = this;
     const sides = 48;
-    const rings = torsoRings();
+    const rings = torsoRings(this.basis.torso);
     const [places, normals, indices] = [[], [], []];
     rings.forEach(([z, rx, ry], i) => {
       const [below, above] = [rings[Math.max(0, i - 1)], rings[Math.min(rings.length - 1, i + 1)]];

@@ -9,19 +9,21 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Outline of the torso: height of the section's centre above the centre of the lungs, and its half
- * widths to the sides and to front and back, in halves of the lungs' extent along each axis. */
-static const double torso[][3] = {
+static const double torso[SUPINE_RENDER_SECTIONS][3] = {
     {-4.4, 1.2, 1.16}, {-3, 1.2, 1.14},    {-2, 1.1, 1.08},     {-1, 1.16, 1.18},   {0, 1.3, 1.22},
     {0.6, 1.45, 1.14}, {1, 1.42, 0.94},    {1.25, 0.95, 0.72},  {1.45, 0.44, 0.54}, {1.7, 0.4, 0.52},
     {1.92, 0.46, 0.7}, {2.3, 0.56, 0.84},  {2.65, 0.52, 0.78},  {2.9, 0.34, 0.5},   {3, 0.001, 0.001}};
 
 enum {
-  SECTIONS = sizeof torso / sizeof *torso,
+  SECTIONS = SUPINE_RENDER_SECTIONS,
   BETWEEN = 6, /* sections of the surface from one section of the table to the next */
   RINGS = (SECTIONS - 1) * BETWEEN + 1,
   SIDES = 48,
 };
+
+const double *supine_render_torso(size_t i) {
+  return i < SECTIONS ? torso[i] : NULL;
+}
 
 /* Interpolate the table at section `ring` of the surface by a Catmull-Rom spline. */
 static void section(size_t ring, double at[3]) {

@@ -107,6 +107,13 @@ typedef struct supine_scene {
   const double *extent; /**< [4] smallest and largest x, then y, mm; NULL: those of this scene */
 } supine_scene;
 
+enum { SUPINE_RENDER_SECTIONS = 15 }; /**< number of sections of the torso's outline */
+
+/** Return a section of the outline of the torso that is drawn around lungs, in halves of the lungs'
+ * extent along each axis: height of its centre above that of the lungs, and its half widths to the
+ * sides and to front and back. NULL if `i` is SUPINE_RENDER_SECTIONS or above. */
+const double *supine_render_torso(size_t i);
+
 /** Enlarge a box, with the corners `low` and `high`, to contain the vertices `xyz` [count, 3]. */
 void supine_render_box(const float *xyz, size_t count, double low[3], double high[3]);
 
