@@ -343,6 +343,11 @@ static const supine_input inputs[] = {
     .against = TEXT("the simulated volumes in this direction of gravity"), .measured = TEXT("distance outside their range, mL"),
     .told = NAN, .refused = 0, .evidence = TEXT("definition"),
     .remedy = TEXT("choose a volume in the range"), .interfaces = ALL},
+  [SUPINE_INPUT_BASIS_ERROR] = {
+    .name = "basis-error", .group = TEXT("Bases"), .input = TEXT("the displacements of a basis that was made"),
+    .against = TEXT("held-out directions, or runs left out"), .measured = TEXT("RMS error / RMS displacement"),
+    .told = NAN, .refused = 0.5, .evidence = TEXT("assumed: half; synthetic lungs with one mode, or with band 0: 0.10; a Fourier transform that does nothing: 41"),
+    .remedy = TEXT("choose a higher band and more modes, or simulate more directions; if these are high, check the numerical libraries"), .interfaces = OFFLINE},
 };
 /* clang-format on */
 _Static_assert(sizeof inputs / sizeof *inputs == SUPINE_INPUT_COUNT, "each input needs a row");

@@ -279,7 +279,7 @@ static void add_all(entries *list, const supine_prepared *prepared,
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 22 };
+enum { TENSORS_MAX = 23 };
 
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
 static supine_tensor list_coefficients(const supine_computed *computed,
@@ -300,6 +300,8 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
   const supine_compression *field = &made->field;
   const supine_volume_forms *forms = &computed->forms;
   const supine_error_table *table = &computed->table;
+  const size_t bands = table->band_count;
+  const size_t modes = table->mode_count;
   const size_t n = lungs->mesh.vertex_count;
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
@@ -330,16 +332,9 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"resting_volume", SUPINE_F64, 2, {g, 9}, made->rest},
       {"full_volume", SUPINE_F64, 2, {g, 9}, made->full},
       {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
-      {"error_harmonics",
-       SUPINE_F64,
-       1,
-       {table->band_count},
-       table->band_count > 0 ? table->harmonics : NULL},
-      {"error_modes",
-       SUPINE_F64,
-       1,
-       {table->mode_count},
-       table->mode_count > 0 ? table->modes : NULL},
+      {"error_harmonics", SUPINE_F64, 1, {bands}, bands > 0 ? table->harmonics : NULL},
+      {"error_modes", SUPINE_F64, 1, {modes}, modes > 0 ? table->modes : NULL},
+      {"error_vertices", SUPINE_F32, 1, {n}, computed->vertex_error},
       {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},
       {"normal_weights",
        SUPINE_F64,

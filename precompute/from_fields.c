@@ -88,6 +88,9 @@ supine_status supine_precompute_from_fields(const supine_prepared *prepared,
   SUPINE_TRY(supine_projection_volume_forms(compression, &computed->lungs, prepared->model.share,
                                             &computed->field.rows, &computed->forms, error));
   SUPINE_TRY(supine_precompute_tell_progress(choice, 4, error));
+  const size_t n = computed->lungs.mesh.vertex_count;
+  computed->vertex_error = supine_arena_take(&computed->memory, n, sizeof(float));
+  SUPINE_TRY(supine_arena_check(&computed->memory, error, "%zu vertices", n));
   return supine_fields_measure(&computed->fit, choice->modes == 0 ? 0 : compression->mode_count,
-                               &computed->accuracy, error);
+                               &computed->accuracy, computed->vertex_error, error);
 }

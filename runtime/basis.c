@@ -527,6 +527,22 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional tensor 'error_vertices' of another simulator's fields. */
+static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
+  size_t n = basis->info.vertex_count;
+  if (!basis->info.is_fields || supine_safetensors_find(c->file, "error_vertices") == NULL) {
+    return SUPINE_OK;
+  }
+  REQUIRE(basis->vertex_error, c, "error_vertices", SUPINE_F32, 1, &n);
+  for (size_t i = 0; i < n; ++i) {
+    if (!(basis->vertex_error[i] >= 0)) {
+      return refuse(c, "tensor 'error_vertices' has %g mm at vertex %zu, below 0",
+                    (double)basis->vertex_error[i], i);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Check the optional metadata with the constants of expected errors (expected.c). */
 static supine_status check_errors(const check *c, supine_basis *basis) {
   static const char *const keys[] = {"expected_error_mm", "expected_error_from_mm",
@@ -724,7 +740,8 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
       check_numbers, check_surface,   check_field,     check_modes, check_lungs,
       check_weights, check_volume,    check_reference, check_rest,  check_range,
       check_scan,    check_simulated, check_normals,   check_rigid, check_expected,
-      check_errors,  check_collapse,  check_names,     identify};
+      check_errors,  check_collapse,  check_names,     check_vertex_errors,
+      identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

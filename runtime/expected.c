@@ -396,6 +396,36 @@ static supine_status refuse_fields(const supine_basis *basis, supine_error *erro
   return SUPINE_OK;
 }
 
+/* Return whether two poses are the same state. */
+static bool is_same(const supine_basis *basis, const supine_pose *a, const supine_pose *b) {
+  const size_t count = supine_basis_weight_count(basis);
+  double apart = 0;
+  for (size_t i = 0; i < count; ++i) {
+    apart = fmax(apart, fabs(a->weights[i] - b->weights[i]));
+  }
+  return apart == 0;
+}
+
+/* Write the errors of a fit to another simulator's fields, which do not depend on the state. The
+ * errors of two states are taken as independent; the surface of the scan has none.
+ * @param from  NULL for the state of the scan */
+static supine_status evaluate_fields(const supine_basis *basis, const supine_pose *pose,
+                                     const supine_state *from, float *sigma, supine_error *error) {
+  float factor = 1;
+  if (basis->vertex_error == NULL) {
+    return refuse_fields(basis, error);
+  }
+  if (from != NULL && !supine_basis_is_scan(basis, from)) {
+    supine_pose other;
+    SUPINE_TRY(supine_basis_pose(basis, from, &other, error));
+    factor = is_same(basis, pose, &other) ? 0 : (float)sqrt(2);
+  }
+  for (size_t i = 0; i < basis->info.vertex_count; ++i) {
+    sigma[i] = factor * basis->vertex_error[i];
+  }
+  return SUPINE_OK;
+}
+
 /* Compute what supine_expected_all writes. */
 static supine_status evaluate_all(const supine_basis *basis, const supine_state *state,
                                   const supine_state *from, float *sigma,
@@ -418,8 +448,10 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
                                     const supine_state *from, float *sigma, supine_error *error) {
   double mean[SUPINE_EXPECTED_TERMS];
   supine_pose pose;
-  SUPINE_TRY(refuse_fields(basis, error));
   SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* refuses impossible volumes */
+  if (supine_basis_get_info(basis)->is_fields) {
+    return evaluate_fields(basis, &pose, from, sigma, error);
+  }
   return evaluate_all(basis, state, from, sigma, mean, error);
 }
 

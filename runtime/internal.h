@@ -87,6 +87,9 @@ struct supine_basis {
   /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
    * if the file has none */
   const double *volume_range;
+  /** [vertices] RMS error of the fit to another simulator's fields in runs left out, mm; NULL if the
+   * file has none */
+  const float *vertex_error;
   bool allow_folds;      /**< poses are not checked by `volume_range` */
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;

@@ -296,10 +296,11 @@ CASES = {
     "fields-run-error": (lambda: simulated(volumes=3), lambda: simulated(change=lambda u: with_run(u, -1)), "told"),
     "fields-left-out": (lambda: simulated(volumes=3), lambda: simulated(volumes=3, change=shuffled), "refused"),
     "fields-volume": (lambda: simulated_volume(1.2), lambda: simulated_volume(2.0), "refused"),
+    "basis-error": (lambda: simulated(), lambda: simulated(band=0), "refused"),
 }
 
 
-def simulated(directions=None, volumes=1, change=lambda u: u):
+def simulated(directions=None, volumes=1, change=lambda u: u, **options):
     """Fields of another simulator: the lungs sag along gravity, the lower part more, and widen with their volume."""
     directions = even(40) if directions is None else directions
     place = (solid - solid.mean(axis=0)) / 100
@@ -312,7 +313,7 @@ def simulated(directions=None, volumes=1, change=lambda u: u):
     def written(call):
         supine.save_fields("given.safetensors", solid, gravity, displacement)
         return call()
-    return {key: lambda call=call: written(call) for key, call in made("lungs.ply", fields="given.safetensors").items()}
+    return {key: lambda call=call: written(call) for key, call in made("lungs.ply", fields="given.safetensors", **options).items()}
 
 
 def simulated_volume(factor):

@@ -128,9 +128,10 @@ supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *f
 
 /** Measure the errors of a basis of the fit: each run predicted from the others, in mm and relative
  * to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume.
- * @param modes  number of modes of the basis, or 0 if it has the harmonics themselves */
+ * @param modes     number of modes of the basis, or 0 if it has the harmonics themselves
+ * @param vertices  [vertices] RMS error of each vertex over the runs, mm, written */
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
-                                    supine_error *error);
+                                    float *vertices, supine_error *error);
 
 /** Refuse a posture in which a lung was not simulated at the volume of the given surface.
  * @param fit      of order 1 or more

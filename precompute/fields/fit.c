@@ -311,31 +311,38 @@ supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *f
   return SUPINE_OK;
 }
 
+/* Errors of runs that were left out. */
+typedef struct left_errors {
+  supine_tally *tally;
+  double *square; /* [vertices] sum over the runs of the squared error, mm^2 */
+  double *run;    /* [vertices, 3] work space: errors in one run, mm */
+} left_errors;
+
 /* Add the errors of the vertices of one lung in a run that was left out. */
-static void tally_run(const supine_fit *fit, size_t lung, const double *residual, double *errors,
-                      supine_tally *tally) {
+static void tally_run(const supine_fit *fit, size_t lung, const double *residual,
+                      left_errors *errors) {
   const int m = (int)fit->fields->run_count;
   const size_t begin = fit->lungs->lung_begin[lung];
   const size_t width = 3 * (fit->lungs->lung_begin[lung + 1] - begin);
   cblas_dgemv(CblasRowMajor, CblasTrans, m, (int)width, 1.0, fit->fields->displacement + 3 * begin,
-              3 * (int)fit->fields->vertex_count, residual, 1, 0.0, errors, 1);
+              3 * (int)fit->fields->vertex_count, residual, 1, 0.0, errors->run, 1);
   for (size_t i = 0; i < width; i += 3) {
-    const double length = supine_length(errors + i);
-    supine_projection_tally_add(tally, 1, &length);
+    const double length = supine_length(errors->run + i);
+    supine_projection_tally_add(errors->tally, 1, &length);
+    errors->square[begin + i / 3] += length * length;
   }
 }
 
-supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
-                                    supine_error *error) {
+/* Predict each run from the others, and add its errors. */
+static supine_status leave_out(const supine_fit *fit, size_t modes, left_errors *errors,
+                               supine_error *error) {
   const size_t m = fit->fields->run_count;
   const size_t parts = fit->lungs->lung_count;
   const supine_run_groups *groups = &fit->groups;
   SUPINE_ARENA arena = {0};
-  supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
   double *residual = supine_arena_take(&arena, parts * m * m, sizeof *residual);
   double *square = supine_arena_take(&arena, m, sizeof *square);
-  double *errors = supine_arena_take(&arena, 3 * fit->fields->vertex_count, sizeof *errors);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", fit->fields->vertex_count));
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu runs", m));
   for (size_t group = 0; group < groups->count; ++group) {
     const size_t count = groups->begin[group + 1] - groups->begin[group];
     const supine_status status = supine_fields_regression_predict(
@@ -343,18 +350,37 @@ supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_
     SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "cross-validation: %s",
                      supine_status_string(status));
     for (size_t row = 0; row < parts * count; ++row) {
-      tally_run(fit, row / count, residual + row * m, errors, tally);
+      tally_run(fit, row / count, residual + row * m, errors);
     }
   }
+  return SUPINE_OK;
+}
+
+supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
+                                    float *vertices, supine_error *error) {
+  const size_t n = fit->fields->vertex_count;
+  const size_t left = fit->groups.begin[fit->groups.count]; /* runs, some of them twice */
+  SUPINE_ARENA arena = {0};
+  supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
+  left_errors errors = {.tally = tally};
+  errors.square = supine_arena_zeros(&arena, n, sizeof *errors.square);
+  errors.run = supine_arena_take(&arena, 3 * n, sizeof *errors.run);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  SUPINE_TRY(leave_out(fit, modes, &errors, error));
   const double size = supine_fields_size(fit);
-  *accuracy = (supine_accuracy){.direction_count = groups->begin[groups->count],
+  double between = 1.0; /* factor for errors between the volumes */
+  *accuracy = (supine_accuracy){.direction_count = left,
                                 .rms_mm = sqrt(tally->square_sum / (double)tally->count),
                                 .p95_mm = supine_projection_tally_percentile(tally, 0.95),
                                 .max_mm = tally->largest};
   if (fit->report.between > 0.0) { /* directions were left out, but no volumes: add their error */
     const double directions = accuracy->rms_mm;
     accuracy->rms_mm = hypot(directions, fit->report.between * size);
-    accuracy->p95_mm *= directions > 0.0 ? accuracy->rms_mm / directions : 1.0;
+    between = directions > 0.0 ? accuracy->rms_mm / directions : 1.0;
+    accuracy->p95_mm *= between;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    vertices[i] = (float)(between * sqrt(errors.square[i] / (double)left));
   }
   accuracy->relative_rms = accuracy->rms_mm / size;
   accuracy->relative_p95 = accuracy->p95_mm / size;

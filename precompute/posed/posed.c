@@ -60,6 +60,9 @@ supine_status supine_posed_expected(const supine_basis *basis, const supine_stat
                                     const supine_state *from, supine_expected *expected,
                                     supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
+  if (supine_basis_get_info(basis)->is_fields) {
+    return SUPINE_OK;
+  }
   float *sigma = malloc(2 * n * sizeof *sigma);
   double along = 0.0;
   if (sigma == NULL) {
@@ -90,6 +93,19 @@ supine_status supine_posed_errors(const supine_basis *basis, const supine_state 
   const supine_state scan = supine_basis_scan(basis);
   SUPINE_TRY(supine_posed_expected(basis, state, &scan, &errors->position, error));
   return supine_posed_expected(basis, state, from, &errors->moved, error);
+}
+
+supine_status supine_posed_simulator_error(const supine_basis *basis, const supine_state *state,
+                                           supine_expected *expected, supine_error *error) {
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  if (supine_basis_tensor(basis, "error_vertices") == NULL) {
+    return SUPINE_OK;
+  }
+  expected->sigma = malloc(n * sizeof *expected->sigma);
+  if (expected->sigma == NULL) {
+    return supine_error_memory(error, "%zu vertices", n);
+  }
+  return supine_expected_error(basis, state, NULL, expected->sigma, error);
 }
 
 void supine_posed_errors_free(supine_errors *errors) {

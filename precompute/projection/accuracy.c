@@ -248,10 +248,19 @@ supine_status supine_projection_turned_over(const supine_lungs *lungs, const sup
   return SUPINE_OK;
 }
 
+/* Add sums of the squared errors of each vertex, over `poses` poses, to its RMS error, if given. */
+static void add_to_vertices(size_t count, const double *square, size_t poses, float *vertices) {
+  if (vertices != NULL && poses > 0) {
+    for (size_t i = 0; i < count; ++i) {
+      vertices[i] = (float)hypot((double)vertices[i], sqrt(square[i] / (double)poses));
+    }
+  }
+}
+
 supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
                                                      const supine_compression *compression,
                                                      const supine_rows *rows,
-                                                     supine_accuracy *accuracy) {
+                                                     supine_accuracy *accuracy, float *vertices) {
   enum { DIRECTIONS = 16 };
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
@@ -261,6 +270,7 @@ supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
   float *xyz = supine_arena_take(&arena, 3 * n, sizeof *xyz);
   double *u = supine_arena_take(&arena, 3 * n, sizeof *u);
   supine_tally *errors = supine_arena_zeros(&arena, 1, sizeof *errors);
+  double *square = supine_arena_zeros(&arena, n, sizeof *square);
   SUPINE_TRY(supine_arena_status(&arena));
   supine_projection_held_out_directions(DIRECTIONS, gravity);
   for (const double *g = gravity; g < gravity + 3 * DIRECTIONS; g += 3) {
@@ -283,8 +293,10 @@ supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
       }
       square_sum += supine_dot(u + 3 * i, u + 3 * i);
       supine_projection_tally_add(errors, 1, (double[]){supine_length(error)});
+      square[i] += supine_dot(error, error);
     }
   }
+  add_to_vertices(n, square, errors->count / n, vertices);
   if (!(square_sum > 0.0)) {
     return SUPINE_OK;
   }

@@ -80,12 +80,14 @@ supine_status supine_projection_accuracy_measure(const supine_truth *truth,
  * the RMS error and of the percentile, and add the maximum. The error of storage is the difference
  * between the positions that the run time computes and the same sum of modes in double precision,
  * in 16 directions of gravity, at the default volume if the surface can have it.
- * @param basis  opened with the default storage
- * @param rows   kind of the rows of `compression` */
+ * @param basis     opened with the default storage
+ * @param rows      kind of the rows of `compression`
+ * @param vertices  [vertices] RMS error of each vertex, mm, to which that of storage is added, or
+ *   NULL */
 supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
                                                      const supine_compression *compression,
                                                      const supine_rows *rows,
-                                                     supine_accuracy *accuracy);
+                                                     supine_accuracy *accuracy, float *vertices);
 
 /** Find the share of triangles, 0 to 1, whose normals turn by more than 90 degrees from the
  * reference surface to a given volume. It is the largest share in the six postures with gravity

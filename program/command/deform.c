@@ -61,7 +61,10 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
                               .subtract_hilum = wanted->frame == 1};
-  char comment[256 + SUPINE_CAVEATS_SIZE];
+  static const char simulator[] = "expected_error_mm: of the fit to the other simulator, RMS over "
+                                  "runs left out; ";
+  const char *by = "";
+  char comment[384 + SUPINE_CAVEATS_SIZE];
   char caveats[SUPINE_CAVEATS_SIZE];
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
@@ -75,10 +78,14 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
     SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &errors.moved,
                                              error));
   }
+  if (supine_basis_get_info(basis)->is_fields) {
+    SUPINE_TRY(supine_posed_simulator_error(basis, &moved.state, &errors.position, error));
+    by = errors.position.sigma == NULL ? "" : simulator;
+  }
   moved.errors = errors;
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
-  (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s", moved.from.name,
-                 wanted->frame == 1 ? ", in the frame of the hilum" : "", caveats);
+  (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s%s", moved.from.name,
+                 wanted->frame == 1 ? ", in the frame of the hilum" : "", by, caveats);
   moved.save.comment = comment;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
   return supine_command_deform_content(&wanted->content, basis, &moved, error);
@@ -236,7 +243,9 @@ const supine_command supine_command_deform = {
         "does in each frame, and writes the surface. Each point has the expected error "
         "of its position, expected_error_mm; the same on another day than that of the scan, "
         "another_day_error_mm; and that of its displacement, moved_error_mm, which counts from "
-        "the state of --from. Each is " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT,
+        "the state of --from. Each is " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
+        "\nOn a surface made with --fields, expected_error_mm is the error of the fit to the other "
+        "simulator, RMS over runs left out.",
     .options = table,
     .notes =
         "Examples:\n"

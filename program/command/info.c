@@ -49,6 +49,9 @@ static const char *const facts[] = {"content",
                                     "lesions",
                                     "reach_mm",
                                     "made_by",
+                                    "clusters",
+                                    "clusters_rms_mm",
+                                    "clusters_seam_percent",
                                     "error_method",
                                     "turned_over_percent"};
 /* Keys of metadata that are printed in the object "error", without the prefix "error_". */

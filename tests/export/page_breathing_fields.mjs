@@ -58,6 +58,12 @@ for (const storage of ['modes', 'clusters']) {
     assert.ok(largestDistance(at, truth[i].xyz) < TOLERANCE_MM, `${states[i]}: the script errs`),
   );
 
+  // The error of the fit at each vertex is that of the file, in steps of 0.002 mm. Vertices have another order.
+  const sorted = (errors) => Array.from(errors).toSorted((a, b) => a - b);
+  const stored = sorted(floatsOf(basis, 'error_vertices'));
+  const shown = sorted(await page.evaluate(() => Array.from(window.supine.basis.library.expectedError())));
+  assert.ok(stored.at(-1) > 0.002 && largestDistance(shown, stored) < 0.002, `${stored.at(-1)} mm`);
+
   // A page of clusters has no coefficients of vertices. The vertices that have arrows move like the others.
   assert.equal(await page.evaluate(() => window.supine.basis.counts === undefined), storage === 'clusters');
   sizes[storage] = statSync(html).size;
@@ -163,6 +169,8 @@ for (const storage of ['modes', 'clusters']) {
   await page.waitForFunction(() => document.getElementById('posture-name').value === 'prone');
   await settled(page);
   assert.match(await page.locator('#finding').textContent(), /^Prone, 900 mL above the scan, /);
+  const words = await page.locator('#surface-text').textContent();
+  assert.match(words, /; error of the fit to the simulator (below )?[\d.]+ mm\.$/);
   const before = await page.evaluate(() =>
     Array.from(window.supine.state.moment.frames ?? window.supine.state.moment.weights),
   );

@@ -43,6 +43,7 @@ typedef struct fixture {
   double range[17][2], limits[17][2][9], shares[17][9][2];
   double total[2];
   const double *full; /* [lungs, 9] volume at full inflation, or NULL */
+  const float *vertex_error; /* [vertices] mm (tensor 'error_vertices'), or NULL */
   const double *held; /* [27, lungs, 2] volumes that the lungs can hold, mL, or NULL */
 } fixture;
 

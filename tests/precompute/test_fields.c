@@ -115,8 +115,15 @@ static supine_status fit_fields(const supine_fields *fields, int band, size_t mo
         supine_sh_compress_modes(&field.expansion, NULL, modes, &made->field, NULL, NULL, error);
   }
   if (status == SUPINE_OK) {
+    float *vertices = malloc(fields->vertex_count * sizeof *vertices);
+    double square = 0.0;
     status = supine_fields_measure(&fit, modes == 0 ? 0 : made->field.mode_count, &made->accuracy,
-                                   error);
+                                   vertices, error);
+    for (size_t i = 0; i < fields->vertex_count; ++i) {
+      square += (double)vertices[i] * (double)vertices[i] / (double)fields->vertex_count;
+    }
+    assert_true(fabs(sqrt(square) - made->accuracy.rms_mm) <= 1e-6 * made->accuracy.rms_mm + 1e-12);
+    free(vertices);
   }
   supine_projection_field_free(&field);
   supine_fields_fit_free(&fit);
@@ -847,7 +854,7 @@ TEST(test_precompute_fields_every_option_used_or_refused) {
                {"help-all", "", 0, "Usage"},
                {"fields", "f.safetensors", 1, "give --fields once"},
                {"output", "c.safetensors", 1, "give --output once"},
-               {"band", "0", 0, "band 0, 1 mode"},
+               {"band", "0", 5, "the basis, of band 0 with 1 mode, would have an error of 95 %"},
                {"modes", "2", 0, "2 modes"},
                {"axes", "LPS", 1, "give --axes once"},
                {"units", "in", 1, "give --units once"},
@@ -912,6 +919,13 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   EXPECT(0, "largest displacement below 0.002 mm",
          "deform b.safetensors --posture supine -o a.ply");
   EXPECT(0, "largest displacement 2.000 mm", "deform b.safetensors --posture prone -o a.ply");
+  size_t size = 0;
+  char *ply = test_read(in_folder("a.ply"), &size);
+  ply[size - 1] = '\0';
+  assert_says(ply, "property float expected_error_mm");
+  assert_says(ply, "expected_error_mm: of the fit to the other simulator");
+  assert_null(strstr(ply, "moved_error_mm"));
+  free(ply);
   EXPECT(0, "displacement, mm", "compare b.safetensors --postures supine,prone");
   assert_null(strstr(printed, "breath"));
   EXPECT(1, "give the posture alone", FIELDS "--scanned supine:rest");

@@ -488,6 +488,40 @@ TEST(test_open_wrong_simulated_volumes_refused_with_reason) {
   end();
 }
 
+TEST(test_expected_error_simulated_is_stored_error) {
+  begin();
+  enum { N = 60 };
+  float stored[N];
+  float sigma[N];
+  supine_error error = {0};
+  const supine_state asked = state_of(oblique, SUPINE_VOLUME_SCAN, 12);
+  const supine_state other = state_of(oblique, SUPINE_VOLUME_SCAN, 30);
+  const supine_state scan = supine_basis_scan(basis);
+  assert_int_equal(supine_expected_error(basis, &asked, NULL, sigma, &error),
+                   SUPINE_ERROR_UNSUPPORTED);
+  assert_true(f->vertices == N);
+  for (size_t i = 0; i < N; ++i) {
+    stored[i] = 0.25F + 0.01F * (float)i;
+  }
+  f->vertex_error = stored;
+  open_again();
+  const supine_state *from[] = {NULL, &scan, &other, &asked};
+  static const double factor[] = {1, 1, 1.4142135623730951, 0};
+  for (size_t k = 0; k < 4; ++k) {
+    assert_int_equal(supine_expected_error(basis, &asked, from[k], sigma, &error), SUPINE_OK);
+    for (size_t i = 0; i < N; ++i) {
+      assert_true(fabs((double)sigma[i] - factor[k] * (double)stored[i]) < 1e-6);
+    }
+  }
+  const supine_state beyond = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, 9e4);
+  assert_int_equal(supine_expected_error(basis, &beyond, NULL, sigma, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  stored[7] = -1e-3F;
+  assert_refused("tensor 'error_vertices' has -0.001 mm at vertex 7, below 0");
+  f->vertex_error = NULL;
+  end();
+}
+
 /* A pose has room for 256 weights of all lungs. */
 TEST(test_open_too_many_weights_refused) {
   begin();

@@ -14,6 +14,9 @@
 
 extern const supine_asset supine_export_assets[]; /* the files of program/view/page */
 
+/* Quantisation step of the errors of vertices, mm. */
+static const double error_step = 0.002;
+
 enum { STORED_MAX = 32767, MODES_MAX = 128 /* meshoptimizer compresses rows of up to 256 bytes */ };
 
 /* Tensors of 64-bit floats that the basis of the surface and that of the structures inside it have
@@ -102,6 +105,15 @@ static void cluster_row(const page *p, const supine_basis_info *info, size_t ver
   row[0] = info->cluster_scalars[2 * vertex];
   row[1] = info->cluster_scalars[2 * vertex + 1];
   row[2] = (int16_t)info->cluster[vertex];
+}
+
+/* Write the error of a fit to another simulator's fields, in steps of `error_step`. */
+static void error_row(const page *p, const supine_basis_info *info, size_t vertex, size_t axis,
+                      int16_t *row) {
+  const float *errors = supine_basis_tensor(p->basis, "error_vertices")->data;
+  (void)info;
+  (void)axis;
+  row[0] = quantise(fmin((double)errors[vertex], STORED_MAX * error_step), error_step);
 }
 
 typedef void fill_row(const page *p, const supine_basis_info *info, size_t vertex, size_t axis,
@@ -289,17 +301,18 @@ static json_t *describe_froms(const page *p) {
 /* Describe the vertices, modes and lungs of the surface as the page stores them. */
 static json_t *describe_surface(const page *p) {
   const supine_basis_info *info = p->info;
-  return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:f, s:o}",
-                   "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
-                   (json_int_t)info->vertex_count, "triangles",
-                   (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
-                   (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count,
-                   "band", (json_int_t)info->band, "order", (json_int_t)info->order, "vector",
-                   (int)info->vector, "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
-                   begins(info, p->order.corner_begin), "hasRest", (int)info->has_rest, "middle",
-                   supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
-                   p->coefficient_step, "references",
-                   supine_options_json_numbers(info->lung_count, info->reference_volume));
+  return json_pack(
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:b, s:o, s:o, s:b, s:o, s:f, s:f, s:f, s:o}",
+      "vertices", (json_int_t)p->order.vertex_count, "wholeVertices",
+      (json_int_t)info->vertex_count, "triangles",
+      (json_int_t)(p->order.corner_begin[info->lung_count] / 3), "modes",
+      (json_int_t)info->mode_count, "clusters", (json_int_t)info->cluster_count, "band",
+      (json_int_t)info->band, "order", (json_int_t)info->order, "vector", (int)info->vector,
+      "lungBegin", begins(info, p->order.lung_begin), "cornerBegin",
+      begins(info, p->order.corner_begin), "hasRest", (int)info->has_rest, "middle",
+      supine_options_json_numbers(3, p->middle), "placeUnit", p->position_step, "unit",
+      p->coefficient_step, "errorUnit", error_step, "references",
+      supine_options_json_numbers(info->lung_count, info->reference_volume));
 }
 
 /* Return the outline of the torso that the page draws, as pictures do. */
@@ -350,6 +363,9 @@ static supine_status add_tensors(page *p) {
     SUPINE_TRY(add_clusters(p));
   } else {
     SUPINE_TRY(add_rows(p, "coefficients", info, axes_of(info), info->mode_count, coefficient_row));
+  }
+  if (info->is_fields && supine_basis_tensor(p->basis, "error_vertices") != NULL) {
+    SUPINE_TRY(add_rows(p, "error_vertices", info, 1, 1, error_row));
   }
   SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],
                          p->order.vertex_count));

@@ -181,6 +181,11 @@ function takeSurface(basis) {
     const shape = vector ? [n, 3, modes] : [n, modes];
     tensors.coefficients = [shape, coefficientsFrom(basis.counts, n, axes, modes, basis.unit)];
   }
+  basis.fitErrors = document.getElementById('tensor-error_vertices') !== null; // of another simulator's fields
+  if (basis.fitErrors) {
+    const counts = takeCounts('error_vertices', n, 1);
+    tensors.error_vertices = [[n], Float32Array.from({ length: n }, (_, v) => basis.errorUnit * counts[2 * v])];
+  }
   return tensors;
 }
 

@@ -48,12 +48,13 @@ function distancesOf(basis, after, before) {
   return { mean: sum / area, p95: (bin / 2000) * far[at], largest: far[at], at };
 }
 
-/** Return RMS expected errors over the surface, mm, as targetsBetween; null if they are unknown, as in another
- * simulator's fields. */
-function surfaceErrors({ library, metadata }, now, from) {
-  if (!metadata.expected_error_mm) return { error: null, session: null, place: null };
+/** Return RMS expected errors over the surface, mm, as targetsBetween; null if they are unknown. In another simulator's
+ * fields, `error` is that of the fit to the simulator. */
+function surfaceErrors({ library, metadata, fitErrors }, now, from) {
+  if (!metadata.expected_error_mm && !fitErrors) return { error: null, session: null, place: null };
   const rms = (sigma) => Math.sqrt(sigma.reduce((sum, x) => sum + x * x, 0) / sigma.length);
   const error = rms(pose(library, now).expectedError(from.state));
+  if (fitErrors) return { error, session: null, place: null };
   const session = rms(library.expectedError());
   return { error, session, place: library.anotherDay(session) };
 }
@@ -175,8 +176,8 @@ function sentenceOf(basis, moved, target, gravity, above) {
       error: '',
       meaning: '',
     };
-  const stated = error === null ? '' : `expected error ${errorText(error)}`;
-  const half = error === null ? '' : spreadWords(session, place, near(gravity, moved.from.gravity));
+  const stated = error === null ? '' : `${errorName(basis)} ${errorText(error)}`;
+  const half = session === null ? '' : spreadWords(session, place, near(gravity, moved.from.gravity));
   if (!isTold({ mm, error }))
     return {
       before:
@@ -202,7 +203,9 @@ function sentenceOf(basis, moved, target, gravity, above) {
   };
 }
 
-const errorText = (mm) => `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`;
+/** Return what the errors of the surface are of. */
+const errorName = ({ fitErrors }) => (fitErrors ? 'error of the fit to the simulator' : 'expected error');
+const errorText = (mm) => (mm < 0.05 ? 'below 0.05 mm' : `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`);
 
 /** Write a sentence of sentenceOf to an element, with its parts emphasised or toned down. */
 function writeSentence(element, sentence) {

@@ -63,7 +63,7 @@ function tellSettled(now) {
 /** Return how far the surface has moved, in words. */
 function surfaceWords({ mean, p95, largest, error }) {
   if (largest < 0.05) return `This is ${state.from.name}.`;
-  const stated = error === null ? '' : `; expected error ${error.toFixed(1)} mm`;
+  const stated = error === null ? '' : `; ${errorName(basis)} ${errorText(error)}`;
   const most = `95 % within ${p95.toFixed(1)}, at most ${largest.toFixed(1)}${stated}`;
   return `${mean.toFixed(1)} mm on average from ${state.from.name}, ${most}.`;
 }

@@ -89,6 +89,8 @@ typedef enum supine_input_id {
   SUPINE_INPUT_FIELDS_RUN_ERROR,
   SUPINE_INPUT_FIELDS_LEFT_OUT,
   SUPINE_INPUT_FIELDS_VOLUME,
+  /* A basis that was made. */
+  SUPINE_INPUT_BASIS_ERROR,
   SUPINE_INPUT_COUNT /**< sentinel: the number of rows */
 } supine_input_id;
 

@@ -84,13 +84,19 @@ typedef enum supine_expected_term {
 /** Compute the expected error of every vertex in a state: of its position if `from` is NULL, or of
  * its displacement from the state `from`.
  *
+ * In a basis of another simulator's fields, the error is that of the fit: the RMS, over runs that
+ * are left out, of what the others do not predict at the vertex, tensor "error_vertices". It is the
+ * same in all states, sqrt(2) of that between two states, and says nothing of how well the
+ * simulator describes a person.
+ *
  * Full inflation was assumed if the file was scanned at rest, and the volume at rest if it was not;
  * neither was, if the file has metadata "resting_known". Cost: up to eight evaluations of every
  * vertex.
  * @param from   NULL for the state of the scan
  * @param sigma  [N] expected 3-D RMS errors, mm, written
  * @return a status of supine_basis_pose, or one of these:
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's displacements */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's displacements, and
+ *   lacks their errors, as points do that 'supine embed' adds */
 SUPINE_API supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,
                                                const supine_state *from, float *sigma,
                                                supine_error *error);
@@ -103,7 +109,8 @@ typedef struct supine_expected_part {
 } supine_expected_part;
 
 /** Compute the terms of supine_expected_error. The sum of the squares of their RMS is the mean of
- * sigma^2. Other parameters and statuses: as supine_expected_error.
+ * sigma^2. A basis of another simulator's fields is SUPINE_ERROR_UNSUPPORTED; other parameters and
+ * statuses: as supine_expected_error.
  * @param parts  [SUPINE_EXPECTED_TERMS] written */
 SUPINE_API supine_status supine_expected_parts(const supine_basis *basis, const supine_state *state,
                                                const supine_state *from,
