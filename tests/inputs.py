@@ -292,7 +292,8 @@ CASES = {
     "fields-large": (lambda: simulated(), lambda: simulated(change=lambda u: (u - u.mean(0)) * 10), "told"),
     "fields-frame": (lambda: simulated(), lambda: simulated(change=lambda u: u * [-1, -1, 1]), "told"),
     "fields-unit": (lambda: simulated(), lambda: simulated(change=lambda u: u / 1000), "told"),
-    "fields-run-size": (lambda: simulated(directions=even(200)), lambda: simulated(directions=even(200), change=lambda u: with_run(u, 7)), "told"),
+    "fields-run-size": (lambda: simulated(directions=even(200)),
+                        lambda: simulated(directions=even(200), change=lambda u: with_run(u, 7)), "told"),
     "fields-run-error": (lambda: simulated(volumes=3), lambda: simulated(change=lambda u: with_run(u, -1)), "told"),
     "fields-left-out": (lambda: simulated(volumes=3), lambda: simulated(volumes=3, change=shuffled), "refused"),
     "fields-volume": (lambda: simulated_volume(1.2), lambda: simulated_volume(2.0), "refused"),
@@ -313,7 +314,8 @@ def simulated(directions=None, volumes=1, change=lambda u: u, **options):
     def written(call):
         supine.save_fields("given.safetensors", solid, gravity, displacement)
         return call()
-    return {key: lambda call=call: written(call) for key, call in made("lungs.ply", fields="given.safetensors", **options).items()}
+    calls = made("lungs.ply", fields="given.safetensors", **options)
+    return {key: lambda call=call: written(call) for key, call in calls.items()}
 
 
 def simulated_volume(factor):
