@@ -133,3 +133,11 @@ vec3 supine_normal(vec4 reference, int part, uvec3 words) {
   vec3 v = supine_normal_weights[int(reference.w) * SUPINE_WORDS + part];
   return v.x * vec3(ivec3(words)) + v.y * vec3(ivec3(words << 13)) + v.z * vec3(ivec3(words << 23));
 }
+
+#ifdef SUPINE_FRAGMENT // define it if this text is put before a fragment shader
+// Compute the unit normal of the triangle, for a basis without stored normals. `place` is the position that the vertex
+// shader computed, interpolated over the triangle. The normal points to where the corners run counter-clockwise.
+vec3 supine_triangle_normal(vec3 place) {
+  return normalize(cross(dFdx(place), dFdy(place)));
+}
+#endif

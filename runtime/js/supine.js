@@ -20,7 +20,7 @@ const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a s
 /** Metadata "checksum" of a file that open() completes (its option `seal`). */
 export const UNSEALED = 'xxh64:0000000000000000';
 // Byte offsets of members of the C struct supine_basis_info in WebAssembly, where pointers and sizes have 4 bytes.
-const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56, normals: 100 };
+const INFO = { vertices: 0, lungs: 16, begin: 20, hasVolume: 25, names: 56 };
 // Byte offsets of members of supine_fact, its size, and the largest number of facts.
 const FACT = { value: 0, name: 24, unit: 28, origin: 32, source: 36, text: 40, size: 208, most: 32 };
 // Types of tensors, in the order of supine_dtype.
@@ -81,7 +81,6 @@ function meanOf({ count, at, move, ...target }) {
 class Basis {
   #c;
   #basis;
-  #lit;
   #hasVolume;
   #uniforms;
   #frames;
@@ -108,7 +107,6 @@ class Basis {
     this.#normals = this.#allocate(12 * this.vertexCount);
     this.#expected = this.#allocate(4 * this.vertexCount);
     this.#facts = this.#allocate(FACT.size * FACT.most);
-    this.#lit = this.#word(info + INFO.normals) > 0;
     this.#readLungs(info);
     this.#makeUniforms();
 
@@ -256,12 +254,7 @@ class Basis {
   }
 
   deformLit() {
-    if (this.#lit) {
-      this.#evaluate(this.#c.supine_deform_lit(this.#basis, this.#pose, this.#positions, this.#normals));
-    } else {
-      this.deform();
-      this.#c.supine_normals(this.#basis, this.#positions, this.#normals);
-    }
+    this.#evaluate(this.#c.supine_deform_lit(this.#basis, this.#pose, this.#positions, this.#normals));
     return this.positions;
   }
 

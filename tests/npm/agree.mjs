@@ -29,7 +29,7 @@ async function check(basis, states, ask) {
 export function pose(lungs, states) {
   return states.map((state) => {
     lungs.pose(state).deformLit();
-    const unknown = lungs.metadata.route === 'fields'; // another simulator's fields, whose error is unknown
+    const unknown = lungs.metadata.route === 'fields' && lungs.tensor('error_vertices') === undefined;
     return {
       positions: lungs.positions.slice(),
       normals: lungs.normals.slice(),

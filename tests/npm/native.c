@@ -55,8 +55,10 @@ static bool write_out(const supine_basis *basis, const supine_state *state, cons
     supine_basis_volumes(basis, pose, volumes);
   }
   supine_deform(basis, pose, xyz);
-  if (supine_deform_lit(basis, pose, NULL, normals) != SUPINE_OK) {
-    supine_normals(basis, xyz, normals);
+  if (info->normal_count > 0) {
+    (void)supine_deform_lit(basis, pose, NULL, normals);
+  } else {
+    supine_normals(basis, xyz, normals); /* supine_deform_lit must agree */
   }
   bool done = fwrite(volumes, sizeof *volumes, info->lung_count, out) == info->lung_count &&
               fwrite(xyz, 3 * sizeof *xyz, n, out) == n &&

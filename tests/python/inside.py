@@ -169,6 +169,10 @@ for wrong in (float("nan"), float("inf")):
     own.weights[0] = wrong
     refused(supine.ArgumentError, "not finite", lungs.deform, own)
 refused(supine.NumericalError, "volume", lungs.pose, "rest-1e6")
+each = lungs.pose((0, -1, 0), {"left": "rest", "right": "rest+250"})
+assert list(each.weights) == list(lungs.pose((0, -1, 0), "left=rest,right=rest+250").weights)
+for wrong in ({"left": 3}, {"left": "rest,right=2L"}, {"middle": "rest"}):
+    refused(supine.ArgumentError, "left" if "left" in wrong else "named", lungs.pose, (0, -1, 0), wrong)
 unlit = supine.open(path, normals=False)  # normals of the triangles, then
 own = unlit.pose("prone")
 xyz, normals = unlit.deform_lit(own)

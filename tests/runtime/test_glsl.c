@@ -52,6 +52,7 @@ enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
   F(PFNGLGETSTRINGPROC, GetString)                                                                 \
   F(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                                               \
   F(PFNGLLINKPROGRAMPROC, LinkProgram)                                                             \
+  F(PFNGLREADPIXELSPROC, ReadPixels)                                                               \
   F(PFNGLMAPBUFFERRANGEPROC, MapBufferRange)                                                       \
   F(PFNGLRENDERBUFFERSTORAGEPROC, RenderbufferStorage)                                             \
   F(PFNGLSHADERSOURCEPROC, ShaderSource)                                                           \
@@ -63,7 +64,8 @@ enum { DIRECTION_AT = 5, NORMALS_AT = 13 }; /* locations of attributes */
   F(PFNGLUNIFORM4FVPROC, Uniform4fv)                                                               \
   F(PFNGLUSEPROGRAMPROC, UseProgram)                                                               \
   F(PFNGLVERTEXATTRIBIPOINTERPROC, VertexAttribIPointer)                                           \
-  F(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)
+  F(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)                                             \
+  F(PFNGLVIEWPORTPROC, Viewport)
 
 typedef struct gl_api {
 #define MEMBER(type, name) type name;
@@ -491,6 +493,78 @@ static void check_clusters(const gl_api *gl, const char *version, const char *li
   fixture_destroy(f);
 }
 
+/* Link an OpenGL program that paints a whole framebuffer with the normal of a triangle, whose
+ * corners have the positions `corner`. */
+static GLuint make_painting_program(const gl_api *gl, const char *version, const char *library) {
+  static const char vertex[] = "uniform vec3 corner[3];\n"
+                               "out vec3 place;\n"
+                               "void main() {\n"
+                               "  place = corner[gl_VertexID];\n"
+                               "  gl_Position = vec4(gl_VertexID == 1 ? 5.0 : -1.0, gl_VertexID == "
+                               "2 ? 5.0 : -1.0, 0.0, 1.0);\n"
+                               "}\n";
+  static const char fragment[] =
+      "in vec3 place;\n"
+      "out vec4 colour;\n"
+      "void main() { colour = vec4(0.5 + 0.5 * supine_triangle_normal(place), 1.0); }\n";
+  const GLuint program = gl->CreateProgram();
+  gl->AttachShader(program, make_shader(gl, GL_VERTEX_SHADER, version, "", "", vertex));
+  gl->AttachShader(program, make_shader(gl, GL_FRAGMENT_SHADER, version,
+                                        "#define SUPINE_FRAGMENT\n", library, fragment));
+  gl->LinkProgram(program);
+  GLint good = 0;
+  gl->GetProgramiv(program, GL_LINK_STATUS, &good);
+  assert_true(good);
+  return program;
+}
+
+/* Assert that the fragment shader computes the normals of the triangles of deformed lungs without
+ * stored normals. Colours have steps of 1/255. */
+static void check_triangle_normals(const gl_api *gl, const char *version, const char *library) {
+  static const double step = 2.0 / 255;
+  const GLuint program = make_painting_program(gl, version, library);
+  fixture *f = fixture_create_simulated(VERTICES, 21);
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  supine_basis *basis = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &basis, NULL), SUPINE_OK);
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_state state = {.gravity = {0.6, -0.3, 0.2}, .volume = {SUPINE_VOLUME_SCAN, 20}};
+  supine_pose pose;
+  float xyz[3 * VERTICES];
+  assert_int_equal(supine_basis_pose(basis, &state, &pose, NULL), SUPINE_OK);
+  assert_int_equal(supine_deform(basis, &pose, xyz), SUPINE_OK);
+  GLuint array = 0;
+  gl->GenVertexArrays(1, &array);
+  gl->BindVertexArray(array);
+  gl->Viewport(0, 0, 1, 1);
+  gl->UseProgram(program);
+  for (size_t t = 0; t < info->triangle_count && t < 60; ++t) {
+    float corner[9];
+    unsigned char colour[4];
+    for (size_t i = 0; i < 9; ++i) {
+      corner[i] = xyz[3 * info->triangles[3 * t + i / 3] + i % 3];
+    }
+    const double a[3] = {(double)(corner[3] - corner[0]), (double)(corner[4] - corner[1]),
+                         (double)(corner[5] - corner[2])};
+    const double b[3] = {(double)(corner[6] - corner[0]), (double)(corner[7] - corner[1]),
+                         (double)(corner[8] - corner[2])};
+    const double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                         a[0] * b[1] - a[1] * b[0]};
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    gl->Uniform3fv(gl->GetUniformLocation(program, "corner"), 3, corner);
+    gl->DrawArrays(GL_TRIANGLES, 0, 3);
+    gl->ReadPixels(0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, colour);
+    assert_int_equal(gl->GetError(), GL_NO_ERROR);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      assert_true(fabs(step * colour[axis] - 1 - n[axis] / length) <= step);
+    }
+  }
+  supine_basis_close(basis);
+  free(bytes);
+  fixture_destroy(f);
+}
+
 static void check_glsl(EGLenum api, const char *version) {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
@@ -504,6 +578,7 @@ static void check_glsl(EGLenum api, const char *version) {
   make_framebuffer(&gl);
   size_t length = 0;
   unsigned char *library = test_read(SUPINE_GLSL, &length);
+  check_triangle_normals(&gl, version, (const char *)library); /* before rasterisation is off */
   static const size_t modes[] = {1, 4, 6, 11, 16};
   for (size_t i = 0; i < sizeof modes / sizeof *modes; ++i) {
     check_modes(&gl, version, (const char *)library, modes[i], false);

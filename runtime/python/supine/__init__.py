@@ -21,7 +21,7 @@ import gzip
 import io
 import os
 import tempfile
-from typing import Any, NamedTuple, Optional, Sequence, Union
+from typing import Any, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,7 @@ __all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_stat
 __version__: str = _c.string(_c.version())
 
 Gravity = Union[str, Sequence[float], NDArray[np.float64]]
+Volume = Union[str, Mapping[str, str]]
 Source = Union[str, bytes, bytearray, memoryview, "os.PathLike[str]"]
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -164,7 +165,7 @@ def _address(array: Floats, count: int, name: str, writable: bool = True) -> int
     return array.__array_interface__["data"][0]
 
 
-def _state(state: Gravity, volume: str = "") -> Any:
+def _state(state: Gravity, volume: Volume = "") -> Any:
     """Convert a state to a C struct. The default posture is supine; the default volume is that of the basis."""
     for text in (state, volume):
         if isinstance(text, (int, float, np.number)):
@@ -174,6 +175,12 @@ def _state(state: Gravity, volume: str = "") -> Any:
         _c.state_parse(state.encode(), wanted)
     else:
         wanted.gravity = _numbers(state, 3, "gravity")
+    if isinstance(volume, Mapping):
+        for name, text in volume.items():
+            if not isinstance(name, str) or not isinstance(text, str) or not name or set("=,") & set(name + text):
+                raise ArgumentError(f"{name!r}: {text!r} is not a lung and its volume: give texts such as "
+                                    "{'left': 'rest+500'}")
+        volume = ",".join(f"{name}={text}" for name, text in volume.items())
     if not isinstance(volume, str):
         raise ArgumentError(f"the volume is {type(volume).__name__}: give a text such as '2600mL' or 'rest+500'")
     if volume:
@@ -362,16 +369,16 @@ class Basis:
         faces[:, 1:] = self.triangles
         return faces.ravel()
 
-    def pose(self, state: Gravity, volume: str = "", out: Optional[Pose] = None) -> Pose:
+    def pose(self, state: Gravity, volume: Volume = "", out: Optional[Pose] = None) -> Pose:
         """Compute the pose of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
-        `pose((0, 0.6, -0.8), "rest")`. The default volume is rest if the basis has a volume at rest. `out` is a
-        pose to write into."""
+        `pose((0, 0.6, -0.8), "rest")`, or with a volume for each lung, `pose("prone", {"left": "rest", "right":
+        "2L"})`. The default volume is rest if the basis has a volume at rest. `out` is a pose to write into."""
         out, wanted = Pose() if out is None else out, _state(state, volume)
         _c.basis_pose(self._c, wanted, out)
         out._made = self._owner, wanted.gravity
         return out
 
-    def expected_error(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> Floats:
+    def expected_error(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> Floats:
         """Compute the expected error [N] of the vertices in a state, mm (3-D RMS): of their positions in the session of
         the scan, or of their displacements from the state `since`. Half of all points lie within 0.9 times their
         expected error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change
@@ -432,7 +439,7 @@ class Basis:
         _c.doubt_frame_errors(frame, 0, self.vertex_count, sigma.ctypes.data)
         return sigma
 
-    def targets(self, state: Gravity, volume: str = "", since: Optional[Gravity] = None) -> list[Target]:
+    def targets(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> list[Target]:
         """Compute where each named structure of a basis made by `embed` is in a state, and how far it has moved from
         the state `since`, or from the scan. The numbers are those of `supine deform -o FILE.csv`."""
         names, part = self.tensor("names"), self.tensor("part")
@@ -472,7 +479,7 @@ class Basis:
         return {text[name]: int(np.flatnonzero(part == name)[0])
                 for name, count in enumerate(np.bincount(part)) if count == 1}
 
-    def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: str = "", *,
+    def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: Volume = "", *,
                noise: float = 2.0, rigid: bool = False) -> Location:
         """Find the lungs from observed positions of vertices. This basis has these vertices; `embed` usually makes it.
 
