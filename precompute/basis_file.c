@@ -194,7 +194,9 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
      * library for WebAssembly needs no cube roots. */
     double expansion[2];
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      supine_lungs_find_hilum(lungs, lung, hilum[lung]);
+      supine_lungs_hilum_mean(lungs, lung,
+                              lungs->scanned != NULL ? lungs->scanned : lungs->mesh.vertices,
+                              hilum[lung]);
       expansion[lung] = 1.0 / cbrt(share[lung]) - 1.0;
     }
     add_by_lung(list, "lung_share", lungs->lung_count, share);
@@ -279,7 +281,7 @@ static void add_all(entries *list, const supine_prepared *prepared,
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 23 };
+enum { TENSORS_MAX = 24 };
 
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
 static supine_tensor list_coefficients(const supine_computed *computed,
@@ -326,6 +328,7 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"simulated_limits", SUPINE_F64, 3, {g, 2, s->limit_terms}, simulated ? s->limits : NULL},
       {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
       {"direction", SUPINE_F32, 2, {n, 3}, made->directions},
+      {"lungs_hilum", SUPINE_F64, 3, {g, 3, k}, made->hilum},
       {"volume_linear", SUPINE_F64, 3, {g, 3, k}, forms->linear},
       {"volume_quadratic", SUPINE_F64, 4, {g, 3, k, k}, forms->quadratic},
       {"volume_cubic", SUPINE_F64, 4, {g, k, k, k}, forms->cubic},

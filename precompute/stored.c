@@ -17,18 +17,46 @@ static void to_float(const double *values, size_t count, float *out) {
   }
 }
 
-/* Shrink the displacements of VECTOR rows in collapsed lungs to the cube root of the lung's share.
- */
-static void collapse_coefficients(const supine_lungs *lungs, const double share[2],
-                                  const supine_compression *field, float *coefficients) {
-  for (size_t i = 0; i < field->row_count; ++i) {
-    const size_t lung = lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1];
-    const float factor = (float)cbrt(share[lung]);
-    for (size_t k = 0; k < field->mode_count; ++k) {
-      const size_t at = i * field->mode_count + k;
-      coefficients[at] = factor * field->coefficients[at];
+/* Return the displacement of a vertex by a mode along an axis, mm. */
+static double displacement_of(const supine_compression *field, const supine_rows *rows, size_t at,
+                              size_t mode) {
+  const size_t row = rows->kind == SUPINE_ROWS_VECTOR ? at : at / 3;
+  const double factor = rows->kind == SUPINE_ROWS_VECTOR ? 1.0 : rows->directions[at];
+  return factor * (double)field->coefficients[row * field->mode_count + mode];
+}
+
+/* Collapse the displacements by each mode. As the hilum moves, they are no longer along one
+ * direction for each vertex: all are stored as vectors. */
+static supine_status collapse_modes(const supine_lungs *lungs, const double share[2],
+                                    supine_arena *arena, supine_stored *made, supine_error *error) {
+  const size_t values = 3 * lungs->mesh.vertex_count;
+  const supine_compression field = made->field;
+  const size_t modes = field.mode_count;
+  SUPINE_ARENA work = {0};
+  double *u = supine_arena_take(&work, values, sizeof *u);
+  made->field.row_count = values;
+  made->field.coefficients = supine_arena_take(arena, values * modes, sizeof(float));
+  made->hilum = supine_arena_take(arena, lungs->lung_count * 3 * modes, sizeof *made->hilum);
+  SUPINE_TRY(supine_arena_check(&work, error, "%zu vertices of a basis", values / 3));
+  SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", values / 3));
+  for (size_t k = 0; k < modes; ++k) {
+    for (size_t i = 0; i < values; ++i) {
+      u[i] = displacement_of(&field, &made->rows, i, k);
+    }
+    supine_lungs_collapse(lungs, share, u, u);
+    for (size_t i = 0; i < values; ++i) {
+      made->field.coefficients[i * modes + k] = (float)u[i];
+    }
+    for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+      double mean[3];
+      supine_lungs_hilum_mean(lungs, lung, u, mean);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        made->hilum[(3 * lung + axis) * modes + k] = mean[axis];
+      }
     }
   }
+  made->rows = (supine_rows){.kind = SUPINE_ROWS_VECTOR};
+  return SUPINE_OK;
 }
 
 /* Collapse the lungs and their displacements, and round them as in the file. */
@@ -37,31 +65,28 @@ static supine_status collapse(const supine_computed *computed, const double shar
   const supine_lungs *lungs = &computed->lungs;
   const supine_rows *rows = &computed->field.rows;
   const size_t n = lungs->mesh.vertex_count;
-  const supine_compression *field = &computed->compression;
-  double *collapsed = supine_arena_take(arena, 3 * n, sizeof *collapsed);
+  const bool healthy = share[0] == 1.0 && share[1] == 1.0;
+  SUPINE_ARENA work = {0};
+  double *collapsed = supine_arena_take(&work, 3 * n, sizeof *collapsed);
   *made = (supine_stored){.vertices = supine_arena_take(arena, 3 * n, sizeof(float)),
                           .lung = supine_arena_take(arena, n, 1),
                           .rest = computed->reference.known ? computed->resting[0] : NULL,
-                          .field = *field,
+                          .field = computed->compression,
                           .rows = *rows};
   SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-  supine_lungs_collapse(lungs, share, collapsed);
+  SUPINE_TRY(supine_arena_check(&work, error, "%zu vertices of a basis", n));
+  supine_lungs_collapse(lungs, share, lungs->mesh.vertices, collapsed);
   to_float(collapsed, 3 * n, made->vertices);
   for (size_t i = 0; i < n; ++i) {
     made->lung[i] = lungs->lung_count == 2 && i >= lungs->lung_begin[1] ? 1 : 0;
   }
+  if (!healthy) {
+    return collapse_modes(lungs, share, arena, made, error);
+  }
   if (rows->kind == SUPINE_ROWS_SCALAR) {
     made->directions = supine_arena_take(arena, 3 * n, sizeof(float));
     SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-    memcpy(collapsed, rows->directions, 3 * n * sizeof *collapsed);
-    supine_lungs_collapse_directions(lungs, share, collapsed);
-    to_float(collapsed, 3 * n, made->directions);
-    made->rows.directions = collapsed;
-  } else if (share[0] != 1.0 || share[1] != 1.0) {
-    made->field.coefficients =
-        supine_arena_take(arena, field->row_count * field->mode_count, sizeof(float));
-    SUPINE_TRY(supine_arena_check(arena, error, "%zu vertices of a basis", n));
-    collapse_coefficients(lungs, share, field, made->field.coefficients);
+    to_float(rows->directions, 3 * n, made->directions);
   }
   return SUPINE_OK;
 }

@@ -14,6 +14,8 @@ typedef struct supine_stored {
   unsigned char *lung;      /**< [N] */
   supine_compression field; /**< coefficients for collapsed lungs */
   supine_rows rows;         /**< of `field`, in double precision */
+  double *hilum; /**< [lungs, 3, modes] mean displacement of each hilum by each mode, mm; NULL if no
+                    lung is collapsed */
   supine_normals_modes normals;
   supine_simulated_volumes simulated;                /**< of fields over volume */
   double shares[2 * 9 * (SUPINE_FIT_ORDER_MAX + 1)]; /**< simulated.shares without gaps */

@@ -477,7 +477,7 @@ static supine_status check_simulated(const check *c, supine_basis *basis) {
 }
 
 /* Read the optional metadata about lungs that the file holds as collapsed: the factor on their
- * lengths in the scan minus 1, and the point about which they have shrunk. */
+ * lengths in the scan minus 1, and the hilum about which they have shrunk, which moves. */
 static supine_status check_collapse(const check *c, supine_basis *basis) {
   static const double most = 100;
   const size_t count = basis->info.lung_count;
@@ -494,6 +494,14 @@ static supine_status check_collapse(const check *c, supine_basis *basis) {
     return refuse(c, "metadata 'lung_expansion' or 'lung_hilum_mm' is out of range");
   }
   basis->info.hilum = basis->hilum[0];
+  if (supine_safetensors_find(c->file, "lungs_hilum") != NULL) {
+    size_t shape[3] = {count, 3, basis->info.mode_count};
+    REQUIRE(basis->hilum_modes, c, "lungs_hilum", SUPINE_F64, 3, shape);
+    const size_t numbers = shape[0] * shape[1] * shape[2];
+    if (!supine_pose_is_finite(basis->hilum_modes, numbers)) {
+      return refuse(c, "tensor 'lungs_hilum' has numbers out of range");
+    }
+  }
   return SUPINE_OK;
 }
 

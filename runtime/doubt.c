@@ -176,6 +176,7 @@ void supine_doubt_evaluate(const supine_doubt *d, size_t state, size_t begin, si
       }
     }
     f->vector[2][0] = EXPECTED_SLIDING * d->turn[state][0];
+    memcpy(f->vector[3], block.collapse[i], sizeof f->vector[3]);
   }
 }
 

@@ -8,7 +8,7 @@
 
 #include "runtime/expected.h"
 
-enum { DOUBT_VECTORS = 3 }; /* assumed volume, heart, sliding */
+enum { DOUBT_VECTORS = 4 }; /* assumed volume, heart, sliding, collapse */
 
 struct supine_doubt {
   const supine_basis *basis;

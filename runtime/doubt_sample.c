@@ -109,7 +109,7 @@ supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint6
                                   size_t index, float *xyz, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(doubt->basis);
   supine_doubt_features features[LOCATE_BLOCK];
-  double factor[DOUBT_VECTORS]; /* of assumed volume, heart and sliding */
+  double factor[DOUBT_VECTORS]; /* of assumed volume, heart, sliding and collapse */
   if (state >= doubt->state_count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "state %zu: give one below %zu", state,
                             doubt->state_count);

@@ -20,7 +20,8 @@ static const struct {
     {"assumed volume",
      "standard deviation of the share at rest in other people (supine info: resting shares)"},
     {"heart", "motion of the heart, supine to prone (Chino & Marks 2008, n 16)"},
-    {"sliding", "assumed: sliding of the lungs along gravity, which the model lacks"}};
+    {"sliding", "assumed: sliding of the lungs along gravity, which the model lacks"},
+    {"collapse", "assumed: as much as the collapse moves the tissue; no collapse was measured"}};
 
 /* Return the positive number that the metadata `key` holds, or `usual`. */
 static double number_of(const supine_basis *basis, const char *key, double usual) {
@@ -108,6 +109,40 @@ static double resting_share(const supine_basis *basis) {
   return sum / supine_expected_reference(basis);
 }
 
+/* Add a multiple of the displacement of a lung's hilum from the reference surface. */
+static void add_hilum(const supine_basis *basis, const supine_pose *pose, size_t lung,
+                      double factor, double hilum[3]) {
+  const size_t modes = basis->info.mode_count;
+  const double *weights = supine_basis_lung_weights(basis, pose, lung);
+  if (basis->hilum_modes != NULL) {
+    const double *row = basis->hilum_modes + 3 * modes * lung;
+    for (size_t i = 0; i < 3 * modes; ++i) {
+      hilum[i / modes] += factor * pose->gains[lung][i / modes] * weights[i % modes] * row[i];
+    }
+  }
+}
+
+/* Find how far each lung is collapsed in the poses of a model, and where its hilum is. */
+static supine_status find_collapse(const supine_basis *basis, supine_expected_model *m,
+                                   supine_error *error) {
+  supine_pose scan;
+  if (basis->info.hilum == NULL) {
+    return SUPINE_OK;
+  }
+  SUPINE_TRY(supine_basis_scan_pose(basis, &scan, error));
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    for (size_t k = 0; k < 2; ++k) {
+      const supine_pose *pose = &m->pose[k];
+      double *hilum = m->hilum[lung][k];
+      m->collapse[lung][k] = basis->scan_expansion[lung] - pose->expansion[lung];
+      memcpy(hilum, basis->hilum[lung], sizeof basis->hilum[lung]);
+      add_hilum(basis, pose, lung, 1, hilum);
+      add_hilum(basis, &scan, lung, -1, hilum);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Return whether the volume of a state, of all lungs or of one lung, is relative to `kind`. */
 static bool counts_from(const supine_state *state, supine_volume_kind kind) {
   const supine_volume_kind own = state->volume.kind;
@@ -183,6 +218,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
     return status;
   }
   find_turn(state, from, m);
+  SUPINE_TRY(find_collapse(basis, m, error));
   const double square = basis->squares != NULL
                             ? mean_square_of_lungs(basis, &m->pose[0], &m->pose[1])
                             : mean_square(basis, &m->pose[0], &m->pose[1]);
@@ -230,6 +266,32 @@ void supine_expected_squares(const supine_expected_model *m, double u[EXPECTED_P
   square[SUPINE_EXPECTED_VOLUME] = m->per_step * m->per_step * slope;
   square[SUPINE_EXPECTED_HEART] = pow(EXPECTED_HEART * m->across * beside_heart, 2);
   square[SUPINE_EXPECTED_SLIDING] = pow(EXPECTED_SLIDING * m->sideways, 2);
+  square[SUPINE_EXPECTED_COLLAPSE] = 0;
+}
+
+/* Compute the vector of the term of collapse at vertices begin <= i < end. */
+static void evaluate_collapse(const supine_expected_model *m, size_t begin, size_t end,
+                              supine_expected_block *b) {
+  const supine_basis *basis = m->basis;
+  const float *vertices = supine_basis_vertices(basis) + 3 * begin;
+  size_t lung = 0;
+  memset(b->collapse, 0, sizeof b->collapse);
+  if (basis->info.hilum == NULL) {
+    return;
+  }
+  for (size_t i = 0; i < end - begin; ++i) {
+    while (begin + i >= basis->info.lung_begin[lung + 1]) {
+      ++lung;
+    }
+    for (size_t pose = 0; pose < 2; ++pose) {
+      const double e = pose == 0 ? m->collapse[lung][0] : -m->collapse[lung][1];
+      for (size_t k = 0; k < 3; ++k) {
+        const double x = (double)vertices[3 * i + k] + (double)b->x[pose][3 * i + k];
+        b->collapse[i][k] += e * (x - m->hilum[lung][pose][k]);
+      }
+    }
+    b->square[i][SUPINE_EXPECTED_COLLAPSE] = supine_dot(b->collapse[i], b->collapse[i]);
+  }
 }
 
 void supine_expected_relate(supine_expected_model *m, const double *mean) {
@@ -364,6 +426,7 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
       relate_squares(m, begin + i, u, beside_heart, b->square[i]);
     }
   }
+  evaluate_collapse(m, begin, end, b);
 }
 
 void supine_expected_all(const supine_expected_model *m, float *sigma,

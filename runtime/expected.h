@@ -79,6 +79,9 @@ typedef struct supine_expected_model {
   double per_step; /**< standard deviation of the volume / volume added in EXPECTED_FULLER */
   double across;   /**< length of the change of unit gravity in the x-y plane */
   double sideways; /**< length of the change of unit gravity along x */
+  /** Of each lung, in EXPECTED_AT and EXPECTED_FROM: e of the formula, 0 if it is not collapsed, and
+   * the position of its hilum, mm. */
+  double collapse[SUPINE_LUNGS_MAX][2], hilum[SUPINE_LUNGS_MAX][2][3];
   /** If not 0, the squared errors are those of the displacement minus the mean displacement of the
    * anchors, of which each lung has one. */
   size_t anchor_count;
@@ -89,6 +92,7 @@ typedef struct supine_expected_model {
 typedef struct supine_expected_block {
   float x[EXPECTED_POSES][3 * LOCATE_BLOCK];
   double square[LOCATE_BLOCK][SUPINE_EXPECTED_TERMS];
+  double collapse[LOCATE_BLOCK][3]; /**< vector of the term of collapse, mm */
 } supine_expected_block;
 
 /** Prepare the formula for the displacement from state `from` to `state`.
@@ -100,7 +104,8 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
                                       const supine_state *from, double deviation, double least,
                                       supine_expected_model *model, supine_error *error);
 
-/** Compute the squared errors of a displacement by term, mm^2.
+/** Compute the squared errors of a displacement by term, mm^2. That of a collapse is 0, as at the
+ * hilum.
  * @param u             displacement between the two states, mm, by each pair of poses of the model
  * @param beside_heart  the number b of the formula */
 void supine_expected_squares(const supine_expected_model *model, double u[EXPECTED_POSES / 2][3],
@@ -114,7 +119,7 @@ void supine_expected_squares(const supine_expected_model *model, double u[EXPECT
  *                         sill 4/3 c s: taking out the best translation leaves 3/4 of the variance
  *     volume              |d(u_i - u_h)/dV| s_V
  *     heart               12 mm |Dg_xy| (b_i - b_h), as the heart moves the hilum too
- *     sliding             as in the body
+ *     sliding, collapse   as in the body
  *
  * @param mean  [lungs, 3, modes] displacement of each hilum by each mode at weight and gain 1, mm
  */

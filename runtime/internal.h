@@ -81,7 +81,11 @@ struct supine_basis {
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
-  double hilum[SUPINE_LUNGS_MAX][3]; /**< point about which a collapsed lung has shrunk, mm */
+  double hilum[SUPINE_LUNGS_MAX][3]; /**< hilum of each lung in the scan, mm, about which a collapsed
+                                        lung has shrunk there */
+  /** [lung_count, 3, mode_count] displacement of each hilum by each mode, mm, in a file of collapsed
+   * lungs; NULL if they do not move */
+  const double *hilum_modes;
   /** [lung_count] supine_pose.expansion in the scan; 0 for a lung that is not collapsed */
   double scan_expansion[SUPINE_LUNGS_MAX];
   /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL

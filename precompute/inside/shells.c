@@ -9,6 +9,7 @@
 #include "base/vec3.h"
 
 #include "precompute/inside/shells.h"
+#include "precompute/lungs/disease.h"
 
 static double mean_edge(const supine_inside_shell *shell) {
   double sum = 0.0;
@@ -232,34 +233,35 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
   }
 }
 
-/* Return whether a point of the reference surface belongs to the hilum of its lung.
- * @param box  lowest and highest corner of the box around the lung, mm */
-static bool is_hilar(const float *p, const float box[6], bool left) {
-  float at[3]; /* 0 to 1: from the midline, from the front, from the base */
-  for (size_t k = 0; k < 3; ++k) {
-    at[k] = (p[k] - box[k]) / (box[3 + k] - box[k]);
+/* Mark the vertices of a surface that belong to the hilum of their lung in the scan.
+ * @param x       [N, 3] positions in the scan, mm
+ * @param marked  [N] written */
+static void mark_hila(const supine_basis_info *info, const float *x, bool *marked) {
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    double low[3] = {INFINITY, INFINITY, INFINITY};
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 3 * info->lung_begin[lung]; i < 3 * info->lung_begin[lung + 1]; ++i) {
+      low[i % 3] = fmin(low[i % 3], (double)x[i]);
+      high[i % 3] = fmax(high[i % 3], (double)x[i]);
+    }
+    for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
+      const double p[3] = {(double)x[3 * i], (double)x[3 * i + 1], (double)x[3 * i + 2]};
+      marked[i] = supine_lungs_is_hilar(p, low, high, info->lung_names[lung][0] == 'l');
+    }
   }
-  return (left ? at[0] : 1.0F - at[0]) < 0.35F && fabsf(at[1] - 0.5F) < 0.2F &&
-         fabsf(at[2] - 0.5F) < 0.2F;
 }
 
-bool supine_inside_hilum(const supine_basis *basis, double *mean) {
+/* Compute the mean displacement of the marked vertices of each lung by each mode. Return whether
+ * each lung has such vertices. */
+static bool average_marked(const supine_basis *basis, const bool *marked, double *mean) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
   const size_t columns = 3 * info->mode_count;
   double row[3 * SUPINE_MODES_MAX];
-  bool found = supine_basis_metadata(basis, "content") == NULL;
-  memset(mean, 0, info->lung_count * columns * sizeof *mean);
-  if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
-      stored->shape[0] == info->lung_count && stored->shape[1] * stored->shape[2] == columns) {
-    memcpy(mean, stored->data, info->lung_count * columns * sizeof *mean);
-    return true;
-  }
-  for (size_t lung = 0; lung < info->lung_count && found; ++lung) {
+  bool found = true;
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
     double count = 0.0;
     for (size_t i = info->lung_begin[lung]; i < info->lung_begin[lung + 1]; ++i) {
-      if (is_hilar(info->vertices + 3 * i, info->bounds + 6 * lung,
-                   info->lung_names[lung][0] == 'l')) {
+      if (marked[i]) {
         count += 1.0;
         move_vertex(basis, i, row);
         for (size_t k = 0; k < columns; ++k) {
@@ -270,7 +272,30 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
     for (size_t k = 0; k < columns; ++k) {
       mean[lung * columns + k] /= fmax(1.0, count);
     }
-    found = count > 0.0;
+    found = found && count > 0.0;
   }
   return found;
+}
+
+bool supine_inside_hilum(const supine_basis *basis, double *mean) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
+  const size_t columns = 3 * info->mode_count;
+  memset(mean, 0, info->lung_count * columns * sizeof *mean);
+  if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
+      stored->shape[0] == info->lung_count && stored->shape[1] * stored->shape[2] == columns) {
+    memcpy(mean, stored->data, info->lung_count * columns * sizeof *mean);
+    return true;
+  }
+  SUPINE_ARENA arena = {0};
+  supine_pose scan;
+  float *x = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *x);
+  bool *marked = supine_arena_take(&arena, info->vertex_count, sizeof *marked);
+  if (arena.failed || supine_basis_metadata(basis, "content") != NULL ||
+      supine_basis_scan_pose(basis, &scan, NULL) != SUPINE_OK ||
+      supine_deform(basis, &scan, x) != SUPINE_OK) {
+    return false;
+  }
+  mark_hila(info, x, marked);
+  return average_marked(basis, marked, mean);
 }

@@ -75,9 +75,8 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
                                   const supine_mesh_load_options *load, const double *points,
                                   size_t count, supine_inside_reading *reading);
 
-/** Compute the mean displacement of the hila by each mode at weight and gain 1. The hilum of a lung
- * is the part of its surface in the first 0.35 of the box around the lung from the midline, and in
- * the middle 0.4 of it along y and z.
+/** Compute the mean displacement of the hila by each mode at weight and gain 1. The hilum is that
+ * of supine_lungs_is_hilar.
  * @param mean  [lungs, 3, modes] written, mm; from the file, if it holds structures inside lungs
  * @return whether the file determines it */
 bool supine_inside_hilum(const supine_basis *basis, double *mean);

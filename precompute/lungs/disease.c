@@ -42,60 +42,52 @@ supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_le
   return SUPINE_OK;
 }
 
-void supine_lungs_find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]) {
-  const double *p = lungs->mesh.vertices;
-  double low = INFINITY;
-  double high = -INFINITY;
-  for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-    low = fmin(low, p[3 * i]);
-    high = fmax(high, p[3 * i]);
+bool supine_lungs_is_hilar(const double *p, const double low[3], const double high[3], bool left) {
+  double at[3]; /* 0 to 1: from the midline, from the front, from the base */
+  for (size_t k = 0; k < 3; ++k) {
+    at[k] = (p[k] - low[k]) / (high[k] - low[k]);
   }
-  if (lungs->side[lung] > 0) {
-    high = low + 0.25 * (high - low);
-  } else {
-    low = high - 0.25 * (high - low);
-  }
-  double sum[3] = {0.0, 0.0, 0.0};
+  return (left ? at[0] : 1.0 - at[0]) < 0.35 && fabs(at[1] - 0.5) < 0.2 && fabs(at[2] - 0.5) < 0.2;
+}
+
+void supine_lungs_hilum_mean(const supine_lungs *lungs, size_t lung, const double *values,
+                             double mean[3]) {
+  const double *p = lungs->scanned != NULL ? lungs->scanned : lungs->mesh.vertices;
+  const size_t begin = lungs->lung_begin[lung];
+  const size_t end = lungs->lung_begin[lung + 1];
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
   double count = 0.0;
-  for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-    if (p[3 * i] >= low && p[3 * i] <= high) {
+  for (size_t i = 3 * begin; i < 3 * end; ++i) {
+    low[i % 3] = fmin(low[i % 3], p[i]);
+    high[i % 3] = fmax(high[i % 3], p[i]);
+  }
+  mean[0] = mean[1] = mean[2] = 0.0;
+  for (size_t i = begin; i < end; ++i) {
+    if (supine_lungs_is_hilar(p + 3 * i, low, high, lungs->side[lung] > 0)) {
       count += 1.0;
       for (size_t k = 0; k < 3; ++k) {
-        sum[k] += p[3 * i + k];
+        mean[k] += values[3 * i + k];
       }
     }
   }
   for (size_t k = 0; k < 3; ++k) {
-    hilum[k] = sum[k] / count;
+    mean[k] = count > 0.0 ? mean[k] / count : values[3 * begin + k];
   }
 }
 
-void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices) {
-  memcpy(vertices, lungs->mesh.vertices, 3 * lungs->mesh.vertex_count * sizeof *vertices);
+void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], const double *values,
+                           double *collapsed) {
+  memmove(collapsed, values, 3 * lungs->mesh.vertex_count * sizeof *collapsed);
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     if (share[lung] == 1.0) {
       continue;
     }
     const double length = cbrt(share[lung]);
     double hilum[3];
-    supine_lungs_find_hilum(lungs, lung, hilum);
-    for (size_t i = lungs->lung_begin[lung]; i < lungs->lung_begin[lung + 1]; ++i) {
-      for (size_t k = 0; k < 3; ++k) {
-        vertices[3 * i + k] = hilum[k] + length * (vertices[3 * i + k] - hilum[k]);
-      }
-    }
-  }
-}
-
-void supine_lungs_collapse_directions(const supine_lungs *lungs, const double share[2],
-                                      double *directions) {
-  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-    if (share[lung] == 1.0) {
-      continue;
-    }
-    const double length = cbrt(share[lung]);
-    for (size_t at = 3 * lungs->lung_begin[lung]; at < 3 * lungs->lung_begin[lung + 1]; ++at) {
-      directions[at] *= length;
+    supine_lungs_hilum_mean(lungs, lung, collapsed, hilum);
+    for (size_t i = 3 * lungs->lung_begin[lung]; i < 3 * lungs->lung_begin[lung + 1]; ++i) {
+      collapsed[i] = hilum[i % 3] + length * (collapsed[i] - hilum[i % 3]);
     }
   }
 }

@@ -27,27 +27,35 @@ typedef struct supine_lesion {
 supine_status supine_lungs_add_lesion(const supine_lungs *lungs, const supine_lesion *lesion,
                                       double *factors, size_t *reached, supine_error *error);
 
-/** Compute the surface with collapsed lungs (pneumothorax). lungs->mesh keeps the healthy shape,
- * from which displacements are computed.
- *
- * A collapsed lung is shrunk about its hilum, taken as the mean of the vertices in the quarter of
- * its width nearest the midline. Its lengths and its displacements are multiplied by share^(1/3).
- * So with any gain s (factor on the displacement) and direction g of gravity, lung j has exactly
- * the volume
- *
- *     V_j(s, g) = share x healthy V_j(s, g)
- *
- * @param share     [lungs] volume divided by healthy volume, 0 < share <= 1
- * @param vertices  [N, 3] output, mm */
-void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], double *vertices);
+/** Return whether a point of the surface of a lung, as it was scanned, belongs to its hilum: the
+ * first 0.35 of the box around the lung from the midline, in the middle 0.4 of the box along y and
+ * z. This is the only definition of the hilum.
+ * @param p     the point in the scan, mm
+ * @param low   lowest corner of the box around the lung, mm
+ * @param high  highest corner
+ * @param left  whether it is the left lung */
+bool supine_lungs_is_hilar(const double *p, const double low[3], const double high[3], bool left);
 
-/** Estimate the hilum of a lung, mm: the mean of the vertices in the quarter of the lung nearest
- * the midline. supine_lungs_collapse shrinks the lung about this point, which stays where it is. */
-void supine_lungs_find_hilum(const supine_lungs *lungs, size_t lung, double hilum[3]);
+/** Compute the mean of vectors [N, 3] over the vertices of the hilum of a lung. If a coarse surface
+ * has no vertex there, use the first vertex of the lung. */
+void supine_lungs_hilum_mean(const supine_lungs *lungs, size_t lung, const double *values,
+                             double mean[3]);
 
-/** Multiply the displacement directions [N, 3] of each collapsed lung by share^(1/3), in place.
- * `share` is the volume of each lung divided by its healthy volume. */
-void supine_lungs_collapse_directions(const supine_lungs *lungs, const double share[2],
-                                      double *directions);
+/** Compute the positions, or the displacements, of collapsed lungs (pneumothorax) from those of
+ * healthy lungs in the same state. lungs->mesh keeps the healthy shape.
+ *
+ *     x' = h + c^(1/3) (x - h)     with h the mean of x over the hilum
+ *
+ * Applied to positions, this shrinks a lung about its hilum. It is linear: applied to displacements,
+ * it gives those by which the collapsed lung moves about the moving hilum, which stays where it is
+ * in healthy lungs. In each state, the volume of lung j is
+ *
+ *     V_j = c x healthy V_j
+ *
+ * @param share      [lungs] c, volume divided by healthy volume, 0 < c <= 1
+ * @param values     [N, 3] positions or displacements of healthy lungs, mm
+ * @param collapsed  [N, 3] output, mm; may be `values` */
+void supine_lungs_collapse(const supine_lungs *lungs, const double share[2], const double *values,
+                           double *collapsed);
 
 #endif

@@ -6,7 +6,6 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 
-#include "precompute/lungs/disease.h"
 #include "precompute/physics/solve.h"
 #include "precompute/physics/volume_forms.h"
 
@@ -50,7 +49,6 @@ static supine_status solve(const supine_lungs *lungs, const supine_model *model,
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     supine_physics_volume_form_add(&made->form[lung], made->cubic);
   }
-  supine_lungs_collapse_directions(lungs, model->share, made->directions);
   return SUPINE_OK;
 }
 

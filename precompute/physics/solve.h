@@ -16,9 +16,9 @@ typedef struct supine_solution {
   supine_equilibrium *equilibrium; /**< equations of the lungs, kept for their next solve */
   double *catch_;     /**< [vertices] force that each vertex retains after exchanging force
                          with its neighbours */
-  double *directions; /**< [vertices, 3] displacement of each vertex at a force of 1, mm;
-                         shorter in a collapsed lung. With model->strain it is the
-                         displacement itself, and catch_ is 1 */
+  double *directions; /**< [vertices, 3] displacement of each vertex of healthy lungs at a
+                         force of 1, mm. With model->strain it is the displacement itself,
+                         and catch_ is 1 */
   double cubic[3];    /**< volume, mL, added at scale s: cubic[0] s + cubic[1] s^2 + cubic[2] s^3 */
   supine_volume_form form[2]; /**< [lung] added volume, mL, as a polynomial of the factors that
                                  scale displacements along x, y and z */
@@ -37,7 +37,7 @@ void supine_physics_solution_free(supine_solution *solution);
 double supine_physics_solution_largest(const supine_solution *solution);
 
 /** Compute the positions [N, 3] of displaced vertices, mm.
- * @param reference  mesh of the lungs; for collapsed lungs the surface of supine_lungs_collapse
+ * @param reference  mesh of the healthy lungs; supine_lungs_collapse then collapses them
  * @param scale      factor on the displacements */
 void supine_physics_solution_apply(const supine_solution *solution, const supine_mesh *reference,
                                    double scale, double *positions);

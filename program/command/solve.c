@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* supine solve: solve the full physics for one direction of gravity. */
+#include <math.h>
+
 #include "precompute/physics/solve.h"
 #include "base/arena.h"
 #include "base/csv.h"
 #include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
+#include "base/vec3.h"
 #include "precompute/lungs/disease.h"
 
 #include "program/command/list.h"
@@ -171,12 +174,13 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   deformed.vertices = supine_arena_take(&arena, values, sizeof(double));
   reference.vertices = supine_arena_take(&arena, values, sizeof(double));
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", deformed.vertex_count));
-  supine_lungs_collapse(lungs, prepared->model.share, reference.vertices);
+  supine_lungs_collapse(lungs, prepared->model.share, lungs->mesh.vertices, reference.vertices);
   for (size_t i = 0; i < values; ++i) {
     solution->directions[i] *=
         gains[lungs->lung_count == 2 && i >= 3 * lungs->lung_begin[1]][i % 3];
   }
-  supine_physics_solution_apply(solution, &reference, 1.0, deformed.vertices);
+  supine_physics_solution_apply(solution, &lungs->mesh, 1.0, deformed.vertices);
+  supine_lungs_collapse(lungs, prepared->model.share, deformed.vertices, deformed.vertices);
   const bool known = prepared->reference.known;
   const double full = 1e-3 * supine_mesh_volume(&reference);
   const double volume = 1e-3 * supine_mesh_volume(&deformed);
@@ -188,12 +192,16 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
                                    .parts = "the surface folds; triangles that turn over",
                                    .allowed = wanted->allow_folds || !known};
   const supine_mesh_save_options save = {.from = reference.vertices};
+  double largest = 0.0;
+  for (size_t i = 0; i < values; i += 3) {
+    largest = fmax(largest, supine_distance(deformed.vertices + i, reference.vertices + i));
+  }
   SUPINE_TRY(supine_options_plausible(&result, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &deformed, &save, error));
   (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
   print_gains(lungs, gains);
   (void)supine_print(stdout, ", largest displacement %s mm, %+.2f mL\n",
-                     supine_text_distance(supine_physics_solution_largest(solution)).text,
+                     supine_text_distance(largest).text,
                      volume - full);
   return SUPINE_OK;
 }

@@ -301,19 +301,53 @@ static float *positions_at(const supine_basis *basis, const char *named, double 
  * @param length  factor on the lengths of the left lung
  * @param beyond  largest distance, mm, beyond the errors of storage that the bases state */
 static void check_shrunk(const supine_basis *healthy, const supine_basis *ill, const char *named,
-                         double length, double beyond) {
+                         const double hilum[3], double length, double beyond) {
   const supine_basis_info *info = supine_basis_get_info(ill);
   float *x[2] = {positions_at(healthy, named, NULL), positions_at(ill, named, NULL)};
   const double error = error_at(healthy, named) + error_at(ill, named) + beyond;
   assert_true(error < 0.02 + beyond);
   for (size_t i = 0; i < 3 * info->vertex_count; ++i) {
     const bool left = i < 3 * info->lung_begin[1];
-    const double hilum = info->hilum[i % 3];
-    const double expected = left ? hilum + length * ((double)x[0][i] - hilum) : (double)x[0][i];
+    const double fixed = hilum[i % 3];
+    const double expected = left ? fixed + length * ((double)x[0][i] - fixed) : (double)x[0][i];
     assert_close((double)x[1][i], expected, error);
   }
   free(x[0]);
   free(x[1]);
+}
+
+/* Find the hilum of the left lung in a state of healthy lungs: the mean of the vertices that lay in
+ * the first 0.35 of its box from the midline, and the middle 0.4 along y and z, in the scan. */
+static void find_hilum(const supine_basis *healthy, const char *named, double hilum[3]) {
+  const size_t n = 3 * supine_basis_get_info(healthy)->lung_begin[1];
+  float *scan = positions_at(healthy, "supine:scan", NULL);
+  float *now = positions_at(healthy, named, NULL);
+  double low[3] = {INFINITY, INFINITY, INFINITY};
+  double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  double count = 0.0;
+  for (size_t i = 0; i < n; ++i) {
+    low[i % 3] = fmin(low[i % 3], (double)scan[i]);
+    high[i % 3] = fmax(high[i % 3], (double)scan[i]);
+  }
+  hilum[0] = hilum[1] = hilum[2] = 0.0;
+  for (size_t i = 0; i < n; i += 3) {
+    double at[3];
+    for (size_t k = 0; k < 3; ++k) {
+      at[k] = ((double)scan[i + k] - low[k]) / (high[k] - low[k]);
+    }
+    if (at[0] < 0.35 && fabs(at[1] - 0.5) < 0.2 && fabs(at[2] - 0.5) < 0.2) {
+      count += 1.0;
+      for (size_t k = 0; k < 3; ++k) {
+        hilum[k] += (double)now[i + k];
+      }
+    }
+  }
+  assert_true(count > 5.0);
+  for (size_t k = 0; k < 3; ++k) {
+    hilum[k] /= count;
+  }
+  free(scan);
+  free(now);
 }
 
 /* The state `scan` has the lungs, and points inside them, where they were scanned; other states
@@ -336,10 +370,15 @@ TEST(test_precompute_collapsed_lung_scan_is_before_collapse) {
   assert_close(volumes[1][0], volumes[0][0], 0.05);
   assert_close(volumes[3][0], 0.5 * volumes[2][0], 0.05);
   assert_close(volumes[3][1], volumes[2][1], 0.05);
-  check_shrunk(healthy[0], ill[0], "supine:scan", 1.0, 0.0);
-  check_shrunk(healthy[0], ill[0], "supine:rest", length, 0.0);
-  check_shrunk(healthy[1], ill[1], "supine:scan", 1.0, 0.0);
-  check_shrunk(healthy[1], ill[1], "supine:rest", length, 0.05);
+  static const char *const states[] = {"supine:rest", "prone:rest"};
+  for (size_t s = 0; s < 2; ++s) {
+    double hilum[3];
+    find_hilum(healthy[0], states[s], hilum);
+    check_shrunk(healthy[0], ill[0], states[s], hilum, length, 0.01);
+    check_shrunk(healthy[1], ill[1], states[s], hilum, length, 0.05);
+  }
+  check_shrunk(healthy[0], ill[0], "supine:scan", given[0], 1.0, 0.01);
+  check_shrunk(healthy[1], ill[1], "supine:scan", given[0], 1.0, 0.01);
   float *placed = positions_at(ill[1], "supine:scan", NULL);
   for (size_t i = 0; i < 3 * INSIDE; ++i) { /* the file keeps the order within a lung */
     assert_close((double)placed[i], given[i / 3][i % 3], error_at(ill[1], "supine:scan"));
@@ -386,7 +425,8 @@ TEST(test_collapsed_lung_scan_pose_compared_and_refused_by_shader) {
     }
     farthest = fmax(farthest, sqrt(square));
     assert_close((double)distance[i], sqrt(square), 1e-3);
-    assert_close((double)sigma[i], sqrt(SUPINE_EXPECTED_ERROR_MM * sqrt(square)), 0.2);
+    const double collapse = i < info->lung_begin[1] ? square : 0.0;
+    assert_close((double)sigma[i], sqrt(SUPINE_EXPECTED_ERROR_MM * sqrt(square) + collapse), 0.2);
   }
   assert_true(farthest > 20.0);
   float weights[SUPINE_GL_MODES];
@@ -399,6 +439,52 @@ TEST(test_collapsed_lung_scan_pose_compared_and_refused_by_shader) {
   free(x[1]);
   supine_compare_destroy(compare);
   supine_basis_close(basis);
+}
+
+/* Return the RMS, mm, of the distances between two lists of points, or of a list of numbers. */
+static double rms_of(size_t count, const float *values, const float *others) {
+  double sum = 0.0;
+  for (size_t i = 0; i < count; ++i) {
+    const double d = (double)values[i] - (others != NULL ? (double)others[i] : 0.0);
+    sum += d * d;
+  }
+  return sqrt(sum / (double)count * (others != NULL ? 3.0 : 1.0));
+}
+
+/* The expected error of a collapsed lung grows with the collapse. It is at least half the distance
+ * to the other model of a lung of this volume: a healthy one that the law empties. */
+TEST(test_collapsed_lung_expected_error_covers_both_models) {
+  static const char *const shares[] = {"left:0.8", "left:0.5", "left:0.3"};
+  double before = 0.0;
+  char inside[80];
+  (void)snprintf(inside, sizeof inside, "%s.inside", other);
+  supine_basis *healthy[2];
+  make_collapsed("left:1", inside, healthy);
+  for (size_t s = 0; s < 3; ++s) {
+    supine_basis *ill[2];
+    supine_state prone = {.gravity = {0.0, -1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
+    double volumes[2];
+    char small[80];
+    make_collapsed(shares[s], inside, ill);
+    const size_t n = supine_basis_get_info(ill[0])->lung_begin[1];
+    float *sigma = malloc(supine_basis_get_info(ill[0])->vertex_count * sizeof *sigma);
+    float *collapsed = positions_at(ill[0], "prone:rest", volumes);
+    (void)snprintf(small, sizeof small, "prone:left=%.1fmL,right=%.1fmL", volumes[0], volumes[1]);
+    float *emptied = positions_at(healthy[0], small, NULL);
+    assert_int_equal(supine_expected_error(ill[0], &prone, NULL, sigma, NULL), SUPINE_OK);
+    const double stated = rms_of(n, sigma, NULL);
+    assert_true(stated > 0.5 * rms_of(3 * n, collapsed, emptied));
+    assert_true(stated > before);
+    before = stated;
+    free(sigma);
+    free(collapsed);
+    free(emptied);
+    supine_basis_close(ill[0]);
+    supine_basis_close(ill[1]);
+  }
+  supine_basis_close(healthy[0]);
+  supine_basis_close(healthy[1]);
+  (void)unlink(inside);
 }
 
 /* Write a tetrahedron with edges of 14 mm around a point in the left lung. */

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/facts.h>
+
 #include "base/arena.h"
 #include "base/locale.h"
 
@@ -23,7 +25,8 @@ enum { STORED_MAX = 32767, MODES_MAX = 128 /* meshoptimizer compresses rows of u
  * in common. */
 static const char *const shared[] = {
     "modes",        "volume_linear", "volume_quadratic", "volume_cubic",     "resting_volume",
-    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares"};
+    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares",
+    "lungs_hilum"};
 
 /* State while a page is printed. The page stores positions and coefficients as 16-bit integers,
  * which the browser multiplies by a quantisation step. */
@@ -408,9 +411,11 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
   }
   json_auto_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
+  char caveats[1200];
+  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   json_auto_t *data =
-      json_pack("{s:O, s:s, s:O, s:b}", "title", json_object_get(description, "title"), "basis",
-                text, "tensors", p.tensors, "live", (int)shown->live);
+      json_pack("{s:O, s:s, s:s, s:O, s:b}", "title", json_object_get(description, "title"),
+                "caveats", caveats, "basis", text, "tensors", p.tensors, "live", (int)shown->live);
   supine_export_template_fill(supine_export_assets, data, "page.html", file);
   free(text);
   return SUPINE_OK;

@@ -118,6 +118,7 @@ function takeShared({ modes, band, order, lungBegin }) {
     full_volume: [lungs, second],
     volume_range: [27, lungs, 2],
     simulated_range: [lungs, 2],
+    lungs_hilum: [lungs, 3, modes],
   };
   const taken = Object.entries(shapes).map(([name, shape]) => [name, [shape, takeTensor(name, Float64Array)]]);
   const limits = takeTensor('simulated_limits', Float64Array);

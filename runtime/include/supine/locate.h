@@ -10,6 +10,7 @@
  *               + (|dx_i/dV| s_V)^2                      assumed volume
  *               + (12 mm |Dg_xy| b_i)^2                  heart
  *               + (3 mm |Dg_x|)^2                        sliding
+ *               + |e (x_i - h)|^2                        collapse
  *
  *     u_i     displacement of the vertex from a state whose positions are exact, mm
  *     c       4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one
@@ -28,6 +29,10 @@
  *     b_i     max(0, 1 - X / 0.7) 4 Y (1 - Y) max(0, 1 - |Z - 0.65| / 0.35), with X from the
  *             midline outwards, Y from the back and Z from the apex, 0 to 1 in the box around the
  *             lungs. The heart moves by up to 19 mm (Chino & Marks 2008, n 16), but not here
+ *     e, h    of a collapsed lung with the share c of its volume: e = c^(-1/3) - 1, and its hilum.
+ *             e (x_i - h) is the way from the place in the healthy lung, which is more than half
+ *             the distance from the place that the law gives a lung of the same volume. Assumed: no
+ *             collapse was measured. Between two states, the difference of these vectors counts
  *
  * For a change of posture, all terms are extrapolations: nobody was scanned in two postures. Half
  * of all points lie within 0.9 sigma of the truth, 95 % within 1.8 sigma.
@@ -78,6 +83,7 @@ typedef enum supine_expected_term {
   SUPINE_EXPECTED_VOLUME,
   SUPINE_EXPECTED_HEART,
   SUPINE_EXPECTED_SLIDING,
+  SUPINE_EXPECTED_COLLAPSE,
   SUPINE_EXPECTED_TERMS
 } supine_expected_term;
 

@@ -156,8 +156,8 @@ typedef struct supine_basis_info {
    * two vectors P, mm. The coefficients of a vertex at p with the scalars a are m + B p + a_0 P_0 +
    * a_1 P_1. NULL if there are no clusters. */
   const float *cluster_vectors;
-  /** [lung_count, 3] hilum, mm, about which a collapsed lung has shrunk (supine_basis_scan), or
-   * NULL if no lung of the file is collapsed. */
+  /** [lung_count, 3] hilum in the scan, mm, about which a collapsed lung has shrunk there
+   * (supine_basis_scan), or NULL if no lung of the file is collapsed. */
   const double *hilum;
 } supine_basis_info;
 
@@ -317,7 +317,8 @@ SUPINE_API void supine_pose_fill(supine_pose *pose, double gain);
  * A lung that the file holds as collapsed, with a share c of its volume (metadata `lung_share`), is
  * collapsed in all states but this one, which is the scan itself: there, its vertices lie at
  * h + (1 + e) (x - h), e = c^(-1/3) - 1 (metadata `lung_expansion`), where x is their position in
- * the collapsed lung at the inflation of the scan, and h the hilum (metadata `lung_hilum_mm`). Any
+ * the collapsed lung at the inflation of the scan, and h the hilum in the scan (metadata
+ * `lung_hilum_mm`). In every state, a lung is collapsed about its hilum in that state. Any
  * other volume relative to the scan is added to that of the lung that is collapsed at the inflation
  * of the scan. */
 SUPINE_API supine_state supine_basis_scan(const supine_basis *basis);
