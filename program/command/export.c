@@ -9,6 +9,7 @@
 #include "base/output.h"
 #include "base/text.h"
 
+#include "program/command/export_still.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/breath_turn.h"
@@ -127,7 +128,7 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
   return SUPINE_OK;
 }
 
-static supine_status write_page(const supine_basis *basis, const request *wanted,
+static supine_status write_page(supine_basis *basis, const request *wanted,
                                 const char *basis_path, supine_error *error) {
   supine_options_reference_pose from[3];
   char title[256];
@@ -146,6 +147,16 @@ static supine_status write_page(const supine_basis *basis, const request *wanted
     SUPINE_TRY(supine_options_inside_open(basis, wanted->inside, &inside, &names, error));
     page.inside = inside;
   }
+  const supine_still still = {.path = basis_path,
+                              .basis = basis,
+                              .inside_path = wanted->inside,
+                              .inside = inside,
+                              .names = &names,
+                              .from = wanted->from,
+                              .allow_folds = wanted->allow_folds};
+  json_auto_t *shown = NULL;
+  SUPINE_TRY(supine_command_still(&still, &shown, error));
+  page.still = shown;
   SUPINE_TRY(supine_output_open(wanted->path, &output, error));
   SUPINE_TRY(supine_export_html_print(output.file, basis, &page, &written, error));
   SUPINE_TRY(supine_output_commit(&output, error));

@@ -221,7 +221,8 @@ static supine_picture make_picture(studio *s) {
                                                          : 120 + 480 * wanted->view_count};
 }
 
-static supine_status draw_postures(studio *s, supine_error *error) {
+/* Compute and mark all panels. */
+static supine_status fill_panels(studio *s, supine_error *error) {
   for (size_t i = 0; i < s->postures.count; ++i) {
     SUPINE_TRY(fill_panel(s, i, error));
     SUPINE_TRY(score_panel(s, i, error));
@@ -230,6 +231,11 @@ static supine_status draw_postures(studio *s, supine_error *error) {
     SUPINE_TRY(mark_panel(s, i, error));
   }
   write_legend(s);
+  return SUPINE_OK;
+}
+
+static supine_status draw_postures(studio *s, supine_error *error) {
+  SUPINE_TRY(fill_panels(s, error));
   const supine_picture picture = make_picture(s);
   SUPINE_TRY(supine_render_picture_save(s->basis, &picture, s->wanted->output, error));
   (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
@@ -405,6 +411,21 @@ static supine_status film_draw(studio *s, const char *path, supine_error *error)
                    shot.turn[0].seconds, FRAMES_MAX);
   SUPINE_TRY(open_studio(s, path, error));
   return draw_film(s, &shot, error);
+}
+
+supine_status supine_command_pictures_still(const supine_pictures *wanted, const char *path,
+                                            FILE *file, supine_error *error) {
+  SUPINE_FREED_BY(close_studio) studio s = {.wanted = wanted, .postures.count = 1};
+  SUPINE_FREED_BY(supine_render_animation_close) supine_animation *still = NULL;
+  memcpy(s.view, wanted->view, sizeof s.view);
+  SUPINE_TRY(supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &s.postures,
+                                               error));
+  SUPINE_TRY(open_studio(&s, path, error));
+  SUPINE_TRY(fill_panels(&s, error));
+  const supine_picture picture = make_picture(&s);
+  SUPINE_TRY(supine_render_animation_open(picture.width, picture.height, &still, error));
+  SUPINE_TRY(supine_render_animation_add(still, s.basis, &picture, STOP_MS, error));
+  return supine_render_animation_write(still, file, error);
 }
 
 supine_status supine_command_pictures_draw(const supine_pictures *wanted, const char *path,

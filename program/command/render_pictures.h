@@ -26,4 +26,8 @@ typedef struct supine_pictures {
 supine_status supine_command_pictures_draw(const supine_pictures *wanted, const char *path,
                                            supine_error *error);
 
+/* Draw the postures of `wanted` side by side, and write the picture as WebP to `file`. */
+supine_status supine_command_pictures_still(const supine_pictures *wanted, const char *path,
+                                            FILE *file, supine_error *error);
+
 #endif

@@ -18,6 +18,7 @@ const all = [
   'page_views',
   'page_simplified',
   'page_sizes',
+  'page_still',
   'accessibility',
   'report',
 ];

@@ -6,6 +6,8 @@
 
 #include <stdio.h>
 
+#include <jansson.h>
+
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -55,6 +57,8 @@ typedef struct export_page {
   /** Basis of the structures inside the lungs, made by 'supine embed'; NULL to show none. */
   const supine_basis *inside;
   const supine_options_names *names; /**< names of the structures; unused if `inside` is NULL */
+  json_t *still; /**< what is shown where no script may run: the members of {{#still}} in
+                          page.html; NULL for nothing */
   bool live;                         /**< true to show also the states that 'supine stream' sends */
 } export_page;
 

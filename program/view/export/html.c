@@ -414,8 +414,9 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
   char caveats[1200];
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   json_auto_t *data =
-      json_pack("{s:O, s:s, s:s, s:O, s:b}", "title", json_object_get(description, "title"),
-                "caveats", caveats, "basis", text, "tensors", p.tensors, "live", (int)shown->live);
+      json_pack("{s:O, s:s, s:s, s:O, s:b, s:O?}", "title", json_object_get(description, "title"),
+                "caveats", caveats, "basis", text, "tensors", p.tensors, "live", (int)shown->live,
+                "still", shown->still);
   supine_export_template_fill(supine_export_assets, data, "page.html", file);
   free(text);
   return SUPINE_OK;

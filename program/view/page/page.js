@@ -183,6 +183,7 @@ function tell(text) {
 }
 
 document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
+document.body.classList.remove('still');
 try {
   if (!MeshoptDecoder.supported)
     throw new Error('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
@@ -190,5 +191,9 @@ try {
   window.supine = await start();
 } catch (error) {
   tell(error.message);
+  if ($('still')) {
+    $('still').firstElementChild.textContent = error.message;
+    document.body.classList.add('still');
+  }
   throw error;
 }
