@@ -256,10 +256,10 @@ static void free_bytes(supine_bytes *bytes) {
   free(bytes->data);
 }
 
-/* Make the basis of the lungs, and write its file. */
+/* Make the basis of the lungs, open it, and write its file. */
 static supine_status write_basis(request *wanted, const supine_prepared *prepared,
-                                 supine_bytes *bytes, supine_precompute_report *report,
-                                 supine_error *error) {
+                                 supine_bytes *bytes, supine_basis **basis,
+                                 supine_precompute_report *report, supine_error *error) {
   supine_precompute_options *options = &wanted->model.precompute;
   supine_findings findings = {.count = 0};
   supine_progress progress = supine_options_progress_begin(name);
@@ -270,6 +270,7 @@ static supine_status write_basis(request *wanted, const supine_prepared *prepare
   supine_options_progress_end(&progress);
   supine_options_say_findings(name, &findings);
   SUPINE_TRY(status);
+  SUPINE_TRY(supine_basis_open_memory(bytes->data, bytes->size, basis, error));
   return supine_precompute_save(wanted->path, bytes, error);
 }
 
@@ -299,8 +300,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_FREED_BY(free_bytes) supine_bytes bytes = {.data = NULL};
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  SUPINE_TRY(write_basis(wanted, &prepared, &bytes, &report, error));
-  SUPINE_TRY(supine_basis_open_memory(bytes.data, bytes.size, &basis, error));
+  SUPINE_TRY(write_basis(wanted, &prepared, &bytes, &basis, &report, error));
   if (options->fields != NULL) {
     print_fit(wanted, &prepared, basis, &report);
   } else {
