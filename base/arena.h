@@ -57,21 +57,6 @@ static inline void supine_file_close(FILE **file) {
     }                                                                                              \
   } while (0)
 
-/** As SUPINE_REFUSE_IF, with a remedy (supine/status.h) that has no value. */
-#define SUPINE_REFUSE_ADVISE(condition, error, remedy, ...)                                        \
-  do {                                                                                             \
-    if (condition) {                                                                               \
-      return supine_error_advised(error, remedy, supine_error_set(error, __VA_ARGS__));            \
-    }                                                                                              \
-  } while (0)
-
-/** Add a remedy that has no value to an error that was set; return `status`. */
-static inline supine_status supine_error_advised(supine_error *error, supine_remedy remedy,
-                                                 supine_status status) {
-  supine_error_advise(error, remedy, NULL);
-  return status;
-}
-
 /** Allocate an array, aligned for any type; valid until the arena is freed.
  * @return NULL if memory is short or count x size overflows; arena->failed is then true. An array
  *   of 0 bytes is not NULL */

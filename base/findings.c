@@ -22,8 +22,7 @@ static void add(supine_findings *findings, bool is_warning, const char *format, 
   (void)supine_print_text_list(text, sizeof text, format, arguments);
   supine_utf8_escape(text, "", added->text, sizeof added->text);
   added->is_warning = is_warning;
-  added->remedy = SUPINE_REMEDY_NONE;
-  added->value[0] = '\0';
+  memset(added->remedies, 0, sizeof added->remedies);
 }
 
 void supine_findings_warn(supine_findings *findings, const char *format, ...) {
@@ -40,10 +39,10 @@ void supine_findings_note(supine_findings *findings, const char *format, ...) {
   va_end(arguments);
 }
 
-void supine_findings_advise(supine_findings *findings, supine_remedy remedy, const char *value) {
+void supine_findings_advise(supine_findings *findings,
+                            const supine_remedy remedies[SUPINE_REMEDIES_MAX]) {
   if (findings != NULL && findings->count > 0 && findings->dropped == 0) {
     supine_finding *last = &findings->list[findings->count - 1];
-    last->remedy = remedy;
-    (void)snprintf(last->value, sizeof last->value, "%s", value != NULL ? value : "");
+    memcpy(last->remedies, remedies, sizeof last->remedies);
   }
 }

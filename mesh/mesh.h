@@ -74,6 +74,9 @@ typedef struct supine_mesh_report {
 supine_status supine_mesh_load(const char *path, const supine_mesh_load_options *options,
                                supine_mesh *mesh, supine_mesh_report *report, supine_error *error);
 
+/** Length of the smallest lungs of which a scan is likely, mm; a mouse's are some 15 mm long. */
+enum { SUPINE_MESH_ANIMAL_LEAST = 5 };
+
 /** Return whether `side`, mm, is a possible longest side of the bounding box of lungs.
  * @param other  output, a string literal: the unit other than mm in which a length of `side` is
  *             most likely; NULL if it is impossible in every other unit */

@@ -7,6 +7,7 @@
 #include <supine/volume.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "precompute/computed.h"
 
 /* The default number of held-out directions of gravity is HELD_OUT_WORK divided by the number of
@@ -108,7 +109,10 @@ static supine_status check_rest(const supine_computed *made, const double g[3],
         supine_volume_form_gains(&form, straight, 0.0, volume[lung], gains, &inner);
     if (status != SUPINE_OK) {
       inner.status = SUPINE_ERROR_NUMERICAL;
-      inner.remedy = SUPINE_REMEDY_REST_OR_AS_IS;
+      const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+          supine_remedy_change("resting", ""),
+          supine_remedy_give("scanned", "none", "to use the scan as it is")};
+      supine_error_advise(&inner, advice);
       return supine_error_wrap(
           error, &inner,
           "with gravity along %g,%g,%g the volume at rest cannot be %.0f mL below full inflation: ",

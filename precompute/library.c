@@ -13,6 +13,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "precompute/fields/check.h"
 #include "precompute/library.h"
 
@@ -108,15 +109,17 @@ static void tell_folds(const supine_prepared *prepared, const supine_precompute_
   if (supine_input_judge(SUPINE_INPUT_FOLDS, report->turned_over) == SUPINE_INPUT_TAKEN) {
     return;
   }
+  const bool links = prepared->model.reach == 0.0;
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {links ? supine_remedy_give("reach", "10", "")
+                                                           : supine_remedy_change("gain", ""),
+                                                     supine_remedy_change("reach", "")};
   supine_precompute_report_state(report, state, sizeof state);
   supine_findings_warn(
       findings,
-      "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six postures: "
-      "%s",
+      "the surface folds: %.3g %% of its triangles turn over at %s in the worst of six postures%s",
       100.0 * report->turned_over, state,
-      prepared->model.reach == 0.0
-          ? "forces spread over a few mesh links, however short: give a reach, such as 10 mm"
-          : "lower the gain, or give a longer reach");
+      links ? ", as forces spread over a few mesh links, however short" : "");
+  supine_findings_advise(findings, advice);
 }
 
 supine_status supine_precompute_make(const supine_precompute_options *options,

@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -79,8 +80,7 @@ static void tell_volume(const supine_patient_record *record, supine_findings *fi
   char text[512];
   const bool doubted = supine_patient_describe_volume(record, text, sizeof text);
   if (doubted) {
-    supine_findings_warn(findings, "%s", text);
-    supine_findings_advise(findings, SUPINE_REMEDY_FIT_LANDMARKS, NULL);
+    supine_findings_warn(findings, "%s: fit the patient's law to landmarks, too", text);
   } else {
     supine_findings_note(findings, "%s", text);
   }
@@ -136,9 +136,12 @@ static supine_status assume_fitted_state(const supine_patient_record *record,
                                          supine_error *error) {
   supine_findings_note(findings, "the scan is assumed to be the %s of the two that were fitted",
                        record->shown == 0 ? "fuller" : "emptier");
-  supine_findings_advise(findings, SUPINE_REMEDY_SCAN_ASSUMED, NULL);
-  SUPINE_REFUSE_ADVISE(record->shown == 1 && !scan->known, error, SUPINE_REMEDY_SCAN_GIVE,
-                       SUPINE_ERROR_ARGUMENT,
+  const supine_remedy change[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_change("scanned", "if it is not")};
+  const supine_remedy give[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_such_as("scanned", "supine:rest", "for this one")};
+  supine_findings_advise(findings, change);
+  SUPINE_REFUSE_ADVISE(record->shown == 1 && !scan->known, error, give, SUPINE_ERROR_ARGUMENT,
                        "this scan is the emptier of the two that were fitted, and how far it is "
                        "below full inflation is unknown: use the fuller scan");
   return SUPINE_OK;
@@ -172,8 +175,9 @@ static supine_status set_expandability(const supine_precompute_tissue *tissue, s
   if (tissue->expandability == NULL && tissue->profile == SUPINE_PROFILE_UNIFORM) {
     return SUPINE_OK;
   }
-  SUPINE_REFUSE_ADVISE(p->model.stiffness != NULL, error, SUPINE_REMEDY_EXPANDABILITY_OUT,
-                       SUPINE_ERROR_ARGUMENT, "the patient's file sets the stiffness");
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("expandability")};
+  SUPINE_REFUSE_ADVISE(p->model.stiffness != NULL, error, advice, SUPINE_ERROR_ARGUMENT,
+                       "the patient's file sets the stiffness");
   double *a = supine_arena_take(&p->memory, n, sizeof *a);
   SUPINE_TRY(supine_arena_check(&p->memory, error, "%zu vertices", n));
   if (tissue->expandability != NULL) {
@@ -332,8 +336,10 @@ static void list_sources(const supine_precompute_options *options, const supine_
 static supine_status complete_scan(const supine_precompute_volumes *volumes,
                                    const supine_model *model, supine_scan *scan,
                                    supine_error *error) {
+  const supine_remedy no_state[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("scanned"),
+                                                       supine_remedy_give("law", "deep", "")};
   SUPINE_REFUSE_ADVISE(
-      model->from_scan && scan->known, error, SUPINE_REMEDY_LAW_OR_SCAN, SUPINE_ERROR_ARGUMENT,
+      model->from_scan && scan->known, error, no_state, SUPINE_ERROR_ARGUMENT,
       "the law '%s' takes the scan as the reference, but the state of the scan was given",
       supine_physics_law_names[model->law]);
   const supine_volume_kind kind = scan->state.volume.kind;
@@ -343,9 +349,13 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes,
   SUPINE_REFUSE_IF(scan->known && kind != SUPINE_VOLUME_REST && kind != SUPINE_VOLUME_FULL, error,
                    SUPINE_ERROR_ARGUMENT,
                    "the state of the scan must be rest or full inflation, plus or minus a volume");
-  SUPINE_REFUSE_ADVISE(volumes->full != 0.0 && !(volumes->full > 0.0 && kind == SUPINE_VOLUME_REST),
-                       error, SUPINE_REMEDY_FULL_AND_SCAN, SUPINE_ERROR_ARGUMENT,
-                       "the volume at full inflation is for a scan at rest, and must be above 0");
+  SUPINE_REFUSE_IF(!(volumes->full >= 0.0), error, SUPINE_ERROR_ARGUMENT,
+                   "the volume at full inflation is %g mL: give a volume above 0", volumes->full);
+  const supine_remedy at_rest[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_such_as("scanned", "supine:rest", ""), supine_remedy_omit("full")};
+  SUPINE_REFUSE_ADVISE(volumes->full != 0.0 && kind != SUPINE_VOLUME_REST, error, at_rest,
+                       SUPINE_ERROR_ARGUMENT,
+                       "the volume at full inflation is for a scan at rest");
   scan->full = volumes->full;
   return SUPINE_OK;
 }

@@ -9,6 +9,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/text.h"
 
 #include "mesh/image/image.h"
@@ -95,7 +96,9 @@ static void note_map(const char *path, const supine_labels_report *report,
                            "%s: %s lung: %ld open channel%s (a hole through the mask, or a "
                            "hollow open to the outside)",
                            path, side, lung->tunnels, lung->tunnels == 1 ? "" : "s");
-      supine_findings_advise(findings, SUPINE_REMEDY_CLOSE, NULL);
+      const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+          supine_remedy_such_as("close", "3", "to close narrow ones")};
+      supine_findings_advise(findings, advice);
     }
   }
 }
@@ -114,9 +117,13 @@ static supine_status load_maps(reading *r, supine_source *source, supine_error *
   wanted.left_masks = lobes.left;
   wanted.right_masks = lobes.right;
   wanted.axes = r->options->load.axes;
+  wanted.any_size = r->options->load.millimetres_per_unit != 0.0;
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_omit("units"),
+      supine_remedy_give("units", "mm", "to accept any size of the lungs")};
   SUPINE_REFUSE_ADVISE(r->options->load.millimetres_per_unit != 0.0 &&
                            r->options->load.millimetres_per_unit != 1.0,
-                       error, SUPINE_REMEDY_MAP_UNIT, SUPINE_ERROR_ARGUMENT,
+                       error, advice, SUPINE_ERROR_ARGUMENT,
                        "a label map's header states its unit, but another unit was given");
   const char *const *paths = r->paths;
   size_t count = r->count;
@@ -187,11 +194,20 @@ static supine_status check_kinds(const supine_source_options *options, const cha
   *is_map = images == count;
   SUPINE_REFUSE_IF(images > 0 && images < count, error, SUPINE_ERROR_ARGUMENT,
                    "label maps and surfaces were given together: give only one kind");
-  SUPINE_REFUSE_ADVISE(images == 0 && (labels->labels != NULL || labels->edge > 0.0 ||
-                                       labels->close > 0.0 || options->surfaces_out != NULL),
-                       error, SUPINE_REMEDY_MAP_OPTIONS, SUPINE_ERROR_ARGUMENT,
-                       "labels, edge, close or surfaces_out, which are for label maps (.nrrd, "
-                       ".nii, .nii.gz, .mha), were given with surfaces");
+  const struct {
+    const char *argument;
+    bool given;
+  } for_maps[] = {{"labels", labels->labels != NULL},
+                  {"edge", labels->edge > 0.0},
+                  {"close", labels->close > 0.0},
+                  {"surfaces_out", options->surfaces_out != NULL}};
+  for (size_t i = 0; i < sizeof for_maps / sizeof *for_maps; ++i) {
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit(for_maps[i].argument)};
+    SUPINE_REFUSE_ADVISE(images == 0 && for_maps[i].given, error, advice, SUPINE_ERROR_ARGUMENT,
+                         "%s, which is for label maps (.nrrd, .nii, .nii.gz, .mha), was given with "
+                         "surfaces",
+                         for_maps[i].argument);
+  }
   return SUPINE_OK;
 }
 

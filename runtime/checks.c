@@ -7,6 +7,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "runtime/checks.h"
 #include "runtime/internal.h"
@@ -111,6 +112,12 @@ static bool can_hold(const supine_basis *basis, const supine_state *state, const
   return true;
 }
 
+/* Advise on a pose that lungs cannot hold. */
+static supine_status advise_folds(supine_error *error) {
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_allow_folds()};
+  return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);
+}
+
 supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
                                  const supine_pose *pose, supine_error *error) {
   char wrong[256];
@@ -121,8 +128,7 @@ supine_status supine_basis_check(const supine_basis *basis, const supine_state *
   (void)supine_state_describe(state, text, sizeof text);
   (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: %s: choose a volume nearer to rest",
                          text, wrong);
-  supine_error_advise(error, SUPINE_REMEDY_ALLOW_FOLDS, NULL);
-  return SUPINE_ERROR_NUMERICAL;
+  return advise_folds(error);
 }
 
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,
@@ -160,8 +166,7 @@ supine_status supine_basis_pose_gain(const supine_basis *basis, const double gra
                            "the gain %.6g multiplies every displacement: give a gain of -%g to %g",
                            gain, supine_input_get(SUPINE_INPUT_GAIN)->refused,
                            supine_input_get(SUPINE_INPUT_GAIN)->refused);
-    supine_error_advise(error, SUPINE_REMEDY_ALLOW_FOLDS, NULL);
-    return SUPINE_ERROR_NUMERICAL;
+    return advise_folds(error);
   }
   return supine_basis_check(basis, &state, pose, error);
 }

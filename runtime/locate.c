@@ -7,6 +7,7 @@
 #include <supine/inputs.h>
 
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/location.h"
@@ -321,7 +322,8 @@ static supine_status change_volume(workspace *s, double ml, supine_error *error)
   (void)supine_error_set(error, status,
                          "the points need a volume that the lungs cannot hold: check their names, "
                          "unit and axes");
-  supine_error_advise(error, SUPINE_REMEDY_LOCATE_VOLUME, NULL);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("volume", "", "")};
+  supine_error_advise(error, advice);
   return status;
 }
 
@@ -441,7 +443,8 @@ static supine_status refuse_residuals(const workspace *s, const supine_locate_re
                            "the points fit lungs of %.0f mL, under %.0f %% of full inflation "
                            "(%.0f mL): check their names, unit and axes",
                            s->found->volume, 100 * share_least, full);
-    supine_error_advise(error, SUPINE_REMEDY_LOCATE_VOLUME, NULL);
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("volume", "", "")};
+    supine_error_advise(error, advice);
     return SUPINE_ERROR_NUMERICAL;
   }
   return SUPINE_OK;

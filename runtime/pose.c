@@ -75,9 +75,9 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 static supine_status refuse(const char *what, supine_error *error) {
   (void)supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                          "this basis has no volume at %s, as its scan was used unchanged: give "
-                         "scan+ML or an absolute volume such as 2600mL",
+                         "scan+ML or an absolute volume such as 2600mL, or make the basis with the "
+                         "law deep and the state of its scan",
                          what);
-  supine_error_advise(error, SUPINE_REMEDY_BASIS_WITH_REST, NULL);
   return SUPINE_ERROR_ARGUMENT;
 }
 

@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "sh/expansion.h"
 
 void supine_sh_compression_free(supine_compression *compression) {
@@ -67,8 +68,9 @@ void supine_sh_compression_mix(const supine_expansion *expansion, supine_compres
 supine_status supine_sh_compress_harmonics(const supine_expansion *expansion,
                                            supine_compression *compression, supine_error *error) {
   const size_t terms = supine_sh_terms(expansion->band, expansion->order);
-  SUPINE_REFUSE_ADVISE(terms > SUPINE_MODES_MADE_MAX, error, SUPINE_REMEDY_HARMONICS,
-                       SUPINE_ERROR_ARGUMENT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("modes", "16", ""),
+                                                     supine_remedy_give("band", "7", "")};
+  SUPINE_REFUSE_ADVISE(terms > SUPINE_MODES_MADE_MAX, error, advice, SUPINE_ERROR_ARGUMENT,
                        "band %zu has %zu functions, but a basis file holds at most %d",
                        expansion->band, terms, SUPINE_MODES_MADE_MAX);
   if (supine_sh_compression_create(expansion, terms, compression) != SUPINE_OK) {

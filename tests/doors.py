@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 from helpers.verdict import (SOURCE, SUPINE, command, even, folder, javascript, pose_in_c, python, stream, supine,
-                             table, transform, write_ply)
+                             table, transform, voxels_of, write_image, write_pairs, write_ply, write_points)
 import numpy as np
 
 KINDS = ("unit", "axes", "mirror", "person", "swapped", "shifted", "repeated", "range", "finite", "cut")
@@ -51,15 +51,6 @@ at = lambda basis, state, rows=slice(None): basis.deform(basis.pose(state))[rows
 pairs = np.column_stack([within, at(grid, "supine:rest+800", seen)])
 
 
-def voxels():
-    """Return labels 1 (left) and 2 (right) of the voxels of the grid [z, y, x], their spacing and their origin, mm."""
-    frame, size = np.asarray(grid.tensor("grid"), float), np.asarray(grid.tensor("grid_size"), int)
-    place = np.rint((grid.vertices - frame[0]) @ np.linalg.inv(frame[1:])).astype(int).T[::-1]
-    labels = np.zeros(tuple(size)[::-1], np.uint8)
-    labels[tuple(place)] = np.where(depth > 0, 1 + np.asarray(grid.tensor("lung")).ravel(), 0)
-    return {"values": labels, "step": np.diag(frame[1:]).copy(), "origin": frame[0].copy()}
-
-
 def fields():
     """Return fields of another simulator: the lungs sag along gravity, the lower part more."""
     points, directions = other.vertices.astype(float), even(40)
@@ -72,27 +63,6 @@ def fields():
 
 def write_lungs(name, value):
     write_ply(name, *value)
-
-
-def write_points(name, rows):
-    with open(name, "w", encoding="utf-8") as file:
-        file.write("name,x,y,z\n" + "".join("%s,%.3f,%.3f,%.3f\n" % row for row in rows))
-
-
-def write_pairs(name, rows):
-    with open(name, "w", encoding="utf-8") as file:
-        file.write("x,y,z,to_x,to_y,to_z\n")
-        np.savetxt(file, rows, "%.4f", ",")
-
-
-def write_image(name, image):
-    kind = {"uint8": "uchar", "int16": "short", "float32": "float"}[image["values"].dtype.name]
-    vectors = " ".join("(%g,%g,%g)" % tuple(row) for row in np.diag(image["step"]))
-    with open(name, "wb") as file:
-        file.write((f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: "
-                    f"{' '.join(map(str, image['values'].shape[::-1]))}\nspace directions: {vectors}\nspace origin: "
-                    f"({','.join(map(str, image['origin']))})\nencoding: raw\nendian: little\n\n").encode())
-        file.write(np.ascontiguousarray(image["values"]).tobytes())
 
 
 def write_fields(name, value):
@@ -132,7 +102,7 @@ def named(points):
     return [("p%d" % i, *p) for i, p in enumerate(points)]
 
 
-label, ct = voxels(), None
+label, ct = voxels_of(grid), None
 ct = with_part(label, values=np.where(label["values"] > 0, -850, 40).astype(np.int16))
 field = fields()
 STATE = "supine:rest+800"

@@ -311,10 +311,10 @@ def check_distances(files):
 
 
 def check_remedies(files):
-    """Check that only the program names options, that its table of remedies names options that exist, that the tables
-    of the packages have an entry for each remedy, and that no error is set to the message of another without its
-    remedy. Comments may name options, as an option is the shortest name of what it sets."""
-    options = set()
+    """Check that only the program names options, that remedies name arguments that commands have as options, and that
+    no error is set to the message of another without its remedies. Comments may name options, as an option is the
+    shortest name of what it sets."""
+    options, advised = set(), []
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             text = without_comments(opened.read())
@@ -328,23 +328,11 @@ def check_remedies(files):
             if file != "base/status.c" and re.search(r"(?:\.|->)message\b(?!\[)", "".join(arguments(text, call.end()))):
                 line = text.count("\n", 0, call.start()) + 1
                 faults.append(f"{file}:{line}: the remedy of the other error is lost: use supine_error_wrap")
-    with open(os.path.join(source, "runtime/include/supine/status.h"), encoding="utf-8") as opened:
-        names = re.findall(r"^  SUPINE_REMEDY_([A-Z_]+)[, ]", opened.read().split("typedef enum supine_remedy")[1],
-                           re.M)
-    with open(os.path.join(source, "program/options/remedy.c"), encoding="utf-8") as opened:
-        for name in set(re.findall(r"--([a-z][a-z-]*)", without_comments(opened.read()))) - options:
-            faults.append(f"program/options/remedy.c: no command has an option --{name}")
-    with open(os.path.join(source, "runtime/python/supine/_remedies.py"), encoding="utf-8") as opened:
-        words = re.findall(r'^    "(\w+)": ', opened.read(), re.M)
-    if words + ["count"] != [name.lower() for name in names]:
-        faults.append("runtime/python/supine/_remedies.py: the table is not in the order of supine_remedy")
-    with open(os.path.join(source, "runtime/js/supine.js"), encoding="utf-8") as opened:
-        table = re.search(r"const REMEDIES = \[(.*?)\];", opened.read(), re.S)[1]
-    for file in JAVASCRIPT:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            for name in re.findall(r"SUPINE_REMEDY_([A-Z_]+)", opened.read()):
-                if names.index(name) >= len(re.findall(r"\"[^\"]*\"|''", table)):
-                    faults.append(f"runtime/js/supine.js: REMEDIES has no words for {name}, which {file} uses")
+        for name in re.findall(r'\bsupine_remedy_(?:give|such_as|set|change|omit)\("(\w+)"', text):
+            advised.append((file, name.replace("_", "-")))
+    for file, name in advised:
+        if name not in options:
+            faults.append(f"{file}: a remedy names the argument {name}, but no command has the option --{name}")
 
 
 def check_waits():

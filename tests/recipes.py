@@ -51,7 +51,7 @@ void supine_io_save_xyz(const mesh_writer *writer) {
         "base/inputs.c": ("};\n/* clang-format on */", """  [SUPINE_INPUT_PHANTOM_SIZE] = {
     .name = "phantom-size", .group = "Words", .input = "a number of vertices", .against = "screens",
     .measured = "vertices", .told = NAN, .refused = 40000, .evidence = TEXT("assumed"),
-    .remedy = "give fewer", .interfaces = COMMAND},
+    .interfaces = COMMAND},
 };
 /* clang-format on */"""),
         "precompute/lungs/gate.c": None},
@@ -115,8 +115,7 @@ static supine_status write_corners(const char *path, const supine_mesh *mesh, su
     ("  SUPINE_TRY(supine_lungs_phantom_create(", """\
   SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_PHANTOM_SIZE, (double)wanted->vertices) ==
                        SUPINE_INPUT_REFUSED,
-                   error, SUPINE_ERROR_ARGUMENT, "%zu vertices: %s", wanted->vertices,
-                   supine_input_get(SUPINE_INPUT_PHANTOM_SIZE)->remedy);
+                   error, SUPINE_ERROR_ARGUMENT, "%zu vertices: give fewer", wanted->vertices);
   SUPINE_TRY(supine_lungs_phantom_create("""),
     ("  (void)supine_print(stdout", """  if (wanted->corners != NULL) {
     SUPINE_TRY(write_corners(wanted->corners, &mesh, error));

@@ -10,6 +10,7 @@
 #include "base/ascii.h"
 #include "base/input.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/text.h"
 
 #include "mesh/io/read.h"
@@ -163,7 +164,8 @@ static supine_status choose_axes(const mesh_file *file, supine_axes asked,
   if (file->tagged && file->space == SUPINE_AXES_AUTO) {
     (void)supine_error_set(error, SUPINE_ERROR_FORMAT,
                            "%s: its SPACE tag is not three letters such as LPS or RAS", file->path);
-    supine_error_advise(error, SUPINE_REMEDY_AXES, "LPS");
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_such_as("axes", "LPS", "")};
+    supine_error_advise(error, advice);
     return SUPINE_ERROR_FORMAT;
   }
   SUPINE_REFUSE_IF(file->turned, error, SUPINE_ERROR_FORMAT,
@@ -188,10 +190,15 @@ static supine_status convert(const char *path, double scale, supine_axes axes, s
                      SUPINE_ERROR_MESH,
                      "%s: vertex %zu of %zu has a coordinate that is not finite; repair the mesh",
                      path, i, mesh->vertex_count);
-    SUPINE_REFUSE_ADVISE(!(largest * scale <= farthest), error, SUPINE_REMEDY_UNIT,
-                         SUPINE_ERROR_MESH,
-                         "%s: vertex %zu of %zu has a coordinate of %.3g mm; repair the mesh", path,
-                         i, mesh->vertex_count, largest * scale);
+    if (!(largest * scale <= farthest)) {
+      const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+          supine_remedy_give("units", "", "if the file is in another unit")};
+      return supine_error_advised(
+          error, advice,
+          supine_error_set(error, SUPINE_ERROR_MESH,
+                           "%s: vertex %zu of %zu has a coordinate of %.3g mm: repair the mesh",
+                           path, i, mesh->vertex_count, largest * scale));
+    }
     supine_mesh_axes_apply(axes, scale, vertex);
   }
   if (supine_mesh_axes_mirrored(axes)) {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/remedy.h"
 #include "base/text.h"
 
 #include "mesh/labels/mask.h"
@@ -147,32 +148,32 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
   return false;
 }
 
-/* Refuse five lobes of which 1 to 3 lie to the right of 4 and 5: LTRCLobes numbers those of the
- * left lung first, other programs those of the right lung. If a lobe is missing, refuse nothing. */
+/* Refuse five lobes of which 1, 2 and 3 are one lung and lie to the right of 4 and 5: LTRCLobes
+ * numbers those of the left lung first, other programs those of the right lung. In a mirrored map of
+ * LTRCLobes, 3 lies with 4 and 5. If a lobe is missing, refuse nothing. */
 static supine_status check_lobes(const char *path, const supine_image *image,
                                  const labels_tally *tally, supine_error *error) {
-  enum { LOBES = 5, RIGHT_LOBES = 3 };
-  double farthest = -INFINITY; /* largest x of the centres of 1 to 3 */
-  double nearest = INFINITY;   /* smallest x of the centres of 4 and 5 */
-  for (size_t lobe = 1; lobe <= LOBES; ++lobe) {
-    if (tally[lobe].count == 0) {
+  enum { LOBES = 5, THIRD = 2 };
+  double x[LOBES]; /* of the lobes' centres */
+  for (size_t i = 0; i < LOBES; ++i) {
+    const labels_tally *lobe = &tally[i + 1];
+    if (lobe->count == 0) {
       return SUPINE_OK;
     }
-    double x = image->origin[0];
+    x[i] = image->origin[0];
     for (int a = 0; a < 3; ++a) {
-      x += (double)tally[lobe].sum[a] / (double)tally[lobe].count * image->step[a][0];
-    }
-    if (lobe <= RIGHT_LOBES) {
-      farthest = fmax(farthest, x);
-    } else {
-      nearest = fmin(nearest, x);
+      x[i] += (double)lobe->sum[a] / (double)lobe->count * image->step[a][0];
     }
   }
-  SUPINE_REFUSE_IF(farthest < nearest, error, SUPINE_ERROR_MESH,
-                   "%s: its lobes 1, 2 and 3 lie to the right of 4 and 5, so that they are not "
-                   "numbered from left to right, as lungmask's are: give the labels "
-                   "left=4+5,right=1+2+3",
-                   path);
+  const double first = 0.5 * (x[0] + x[1]);
+  const double last = 0.5 * (x[3] + x[4]);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_give("labels", "left=4+5,right=1+2+3", "")};
+  SUPINE_REFUSE_ADVISE(first < last && x[THIRD] < 0.5 * (first + last), error, advice,
+                       SUPINE_ERROR_MESH,
+                       "%s: its lobes 1, 2 and 3 lie to the right of 4 and 5, so that they are not "
+                       "numbered from left to right, as lungmask's are",
+                       path);
   return SUPINE_OK;
 }
 
@@ -195,7 +196,9 @@ static supine_status choose(const char *path, const supine_image *image, const l
     list_labels(tally, NULL, 0, present, sizeof present);
     (void)supine_error_set(error, SUPINE_ERROR_MESH, "%s: which of its labels (%s) are lungs?",
                            path, present);
-    supine_error_advise(error, SUPINE_REMEDY_LABELS, NULL);
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_such_as("labels", "left=10+11,right=12+13+14", "")};
+    supine_error_advise(error, advice);
     return SUPINE_ERROR_MESH;
   }
   if (strcmp(wanted, "one") == 0) {
@@ -232,9 +235,11 @@ static supine_status check(const char *path, const supine_image *image, const la
       list_labels(tally, NULL, 0, present, sizeof present);
       (void)supine_error_set(
           error, SUPINE_ERROR_MESH,
-          "%s: no voxel has a label that was given for the %s lung; the labels present are %s",
+          "%s: no voxel has a label that was given for the %s lung; the labels present are %s: "
+          "name those of both lungs, or of one lung alone",
           path, names[s], present);
-      supine_error_advise(error, SUPINE_REMEDY_LABELS_ONE_LUNG, names[1 - s]);
+      const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("labels", "")};
+      supine_error_advise(error, advice);
       return SUPINE_ERROR_MESH;
     }
   }

@@ -7,6 +7,7 @@
 #include <supine/inputs.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -255,13 +256,19 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);
   }
-  SUPINE_REFUSE_ADVISE(!(lung->mask >= least_volume && longest <= longest_lung), error,
-                       SUPINE_REMEDY_LABELS_CHECK, SUPINE_ERROR_MESH,
+  const bool fits = lung->mask >= least_volume && longest <= longest_lung;
+  supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_change("labels", "if they are not those of the lung")};
+  if (longest > SUPINE_MESH_ANIMAL_LEAST) {
+    advice[1] = supine_remedy_give("units", "mm", "to use this size all the same");
+  }
+  SUPINE_REFUSE_ADVISE(!fits && !w->options->any_size, error, advice, SUPINE_ERROR_MESH,
                        "%s: the %s lung holds %.4g mL in a box %.4g mm long, which is impossible "
                        "for a lung: check the voxel size in the header",
                        w->path, name, lung->mask, longest);
   const supine_status meshed = supine_labels_mask_surface(&mask, w->edge, true, mesh);
-  SUPINE_REFUSE_ADVISE(meshed == SUPINE_ERROR_NUMERICAL, error, SUPINE_REMEDY_EDGE, meshed,
+  const supine_remedy other_edge[SUPINE_REMEDIES_MAX] = {supine_remedy_change("edge", "")};
+  SUPINE_REFUSE_ADVISE(meshed == SUPINE_ERROR_NUMERICAL, error, other_edge, meshed,
                        "%s: the %s lung keeps changing while it is made one piece", w->path, name);
   SUPINE_TRY(meshed);
   supine_labels_mask_free(&mask);
@@ -295,12 +302,17 @@ static supine_status check_sides(const work *w, const supine_mesh *surfaces, sup
       error, SUPINE_ERROR_MESH, "%s: by its header, %s (labels %s)%s", w->path,
       doubted ? "the left lung does not lie left of the right lung" : "the lungs are mirrored",
       w->report->taken, found.axes == SUPINE_AXES_LPS ? "" : ". The lungs' shape fits other axes");
-  if (found.axes == SUPINE_AXES_LPS) {
-    supine_error_advise(error, SUPINE_REMEDY_LABELS_EXCHANGE, NULL);
-  } else {
-    supine_error_advise(
-        error, doubted ? SUPINE_REMEDY_LABELS_OR_AXES : SUPINE_REMEDY_LABELS_AXES_OR_KEEP, letters);
+  supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_change("labels", "if left and right are exchanged"),
+      supine_remedy_change("axes", "if those of the header are wrong")};
+  if (found.axes != SUPINE_AXES_LPS) {
+    char header[4];
+    supine_mesh_axes_letters(w->report->coordinates, header);
+    advice[0] = supine_remedy_give("axes", letters, "if the labels are correct");
+    advice[1] = supine_remedy_give("axes", header, "if the header is correct");
+    advice[1].kind = doubted ? SUPINE_REMEDY_NONE : SUPINE_REMEDY_GIVE;
   }
+  supine_error_advise(error, advice);
   return SUPINE_ERROR_MESH;
 }
 

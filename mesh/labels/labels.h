@@ -25,6 +25,7 @@ typedef struct supine_labels_options {
   supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
   double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
   double close; /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */
+  bool any_size; /**< whether lungs may be smaller and longer than those of people */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
   void *progress_context;

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/remedy.h"
+
 #include "mesh/labels/mask.h"
 
 /* Smallest accepted ratio of the smaller lung's volume to the larger lung's volume. */
@@ -127,6 +129,8 @@ supine_status supine_labels_split(const char *path, labels_mask *both, double *n
       error, SUPINE_ERROR_MESH,
       "%s: cannot split the mask into two lungs: erosion leaves no two pieces beside each other",
       path);
-  supine_error_advise(error, SUPINE_REMEDY_LABELS_SIDE, NULL);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_such_as("labels", "left=1", "if it is one lung")};
+  supine_error_advise(error, advice);
   return SUPINE_ERROR_MESH;
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/fields/frame.h"
@@ -251,8 +252,9 @@ static supine_status choose(supine_fit *fit, int wanted, supine_error *error) {
       fit->chosen.values == NULL && wanted < 0, error, SUPINE_ERROR_ARGUMENT,
       "%zu runs for %zu directions of gravity determine no fit: simulate more directions",
       fit->fields->run_count, fit->report.direction_count);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("band")};
   SUPINE_REFUSE_ADVISE(
-      fit->chosen.values == NULL, error, SUPINE_REMEDY_BAND_OUT, SUPINE_ERROR_ARGUMENT,
+      fit->chosen.values == NULL, error, advice, SUPINE_ERROR_ARGUMENT,
       "%zu directions of gravity do not determine band %d (%d harmonics); the highest band that "
       "they determine is %d: use more directions",
       fit->report.direction_count, wanted, (wanted + 1) * (wanted + 1), (int)highest - 1);

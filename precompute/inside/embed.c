@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
 
@@ -125,8 +126,10 @@ static supine_status check_distance(const embedding *e, supine_error *error) {
     }
   }
   const char *more = far_count > 3 ? " and others" : "";
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_set("clamp", "to move them like the nearest point of the surface")};
   SUPINE_REFUSE_ADVISE(
-      far_count > 0 && !e->options->clamp, error, SUPINE_REMEDY_POINTS_CLAMP, SUPINE_ERROR_MESH,
+      far_count > 0 && !e->options->clamp, error, advice, SUPINE_ERROR_MESH,
       "%zu of %zu (%s%s) are outside the lungs, by up to %.0f mm, where the motion "
       "of the lungs says nothing: leave them out, or check their axes and unit",
       far_count, parts, far, more, farthest);

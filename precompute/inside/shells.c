@@ -68,8 +68,10 @@ supine_status supine_inside_shells_create(const supine_basis *basis, supine_insi
   float *scanned = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *scanned);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
   const supine_status posed = supine_basis_scan_pose(basis, &shells->scan, error);
-  SUPINE_REFUSE_ADVISE(posed == SUPINE_ERROR_NUMERICAL, error, SUPINE_REMEDY_BASIS_OF_STATE, posed,
-                       "the basis cannot reach the scan's volume");
+  SUPINE_REFUSE_IF(
+      posed == SUPINE_ERROR_NUMERICAL, error, posed,
+      "the basis cannot reach the scan's volume: make it again, and state how full the "
+      "lungs were in the scan");
   SUPINE_TRY(posed);
   (void)supine_deform(basis, &shells->scan, scanned);
   for (size_t lung = 0; lung < shells->count; ++lung) {

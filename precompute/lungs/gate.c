@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 
 #include "mesh/repair.h"
@@ -108,10 +109,12 @@ typedef struct checks {
   supine_status status;
 } checks;
 
-/* Unless a condition holds, refuse the input with a status, or only warn if it is SUPINE_OK. */
-SUPINE_PRINTF(6, 7)
-static void check(checks *c, bool holds, supine_status refuse, supine_remedy remedy,
-                  const char *value, const char *format, ...) {
+/* Unless a condition holds, refuse the input with a status, or only warn if it is SUPINE_OK.
+ * @param advice  [SUPINE_REMEDIES_MAX], or NULL for none */
+SUPINE_PRINTF(5, 6)
+static void check(checks *c, bool holds, supine_status refuse, const supine_remedy *advice,
+                  const char *format, ...) {
+  static const supine_remedy none[SUPINE_REMEDIES_MAX];
   char text[512];
   va_list arguments;
   if (holds || c->status != SUPINE_OK) {
@@ -122,35 +125,41 @@ static void check(checks *c, bool holds, supine_status refuse, supine_remedy rem
   va_end(arguments);
   if (refuse != SUPINE_OK) {
     c->status = supine_error_set(c->error, refuse, "%s: %s", c->source->name, text);
-    supine_error_advise(c->error, remedy, value);
+    supine_error_advise(c->error, advice != NULL ? advice : none);
   } else {
     supine_findings_warn(c->findings, "%s: %s", c->source->name, text);
-    supine_findings_advise(c->findings, remedy, value);
+    supine_findings_advise(c->findings, advice != NULL ? advice : none);
   }
+}
+
+static supine_remedy accept_size(void) {
+  return supine_remedy_give("units", "mm", "to use this size all the same");
 }
 
 /* Check the length, proportions and volume of the lungs. A given unit turns refusals into warnings,
  * up to a tenth of the volume that a basis file may have (runtime/plausible.c). */
 static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
   const supine_status refuse = c->source->units_given ? SUPINE_OK : SUPINE_ERROR_MESH;
-  const supine_remedy accept = refuse == SUPINE_OK ? SUPINE_REMEDY_NONE : SUPINE_REMEDY_SIZE_ACCEPT;
+  const supine_remedy use_it[SUPINE_REMEDIES_MAX] = {accept_size()};
   const double ml = lungs->volume[0] + lungs->volume[1];
   const double most = lungs->lung_count == 2 ? 1.0 : 0.6; /* largest share of a pair's volume */
   const double height = lungs->maximum[2] - lungs->minimum[2];
+  const bool can_accept = refuse != SUPINE_OK && height > SUPINE_MESH_ANIMAL_LEAST;
+  const supine_remedy *accept = can_accept ? use_it : NULL;
   const double ratio = height / (lungs->maximum[0] - lungs->minimum[0]);
   static const double most_ml = 1e8;
-  check(c, ml <= most_ml, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
+  check(c, ml <= most_ml, SUPINE_ERROR_MESH, NULL,
         "the lungs hold %.3g mL, more than the %g mL that a basis may have: correct the unit", ml,
         most_ml);
-  check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse, accept, NULL,
+  check(c, lungs->lung_count < 2 || (ratio >= 0.55 && ratio <= 1.8), refuse, accept,
         "the lungs are %.2f times as high as wide, which is impossible: correct the distance of "
         "the slices (the voxel spacing) in the header",
         ratio);
-  check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse, accept, NULL,
+  check(c, likely && ml >= 100.0 * most && ml <= 12000.0 * most, refuse, accept,
         "the lungs are %.0f mm high and hold %.0f mL, which is impossible: correct the voxel "
         "spacing in the header, or the unit",
         height, ml);
-  check(c, ml >= 1500.0 * most, SUPINE_OK, SUPINE_REMEDY_NONE, NULL,
+  check(c, ml >= 1500.0 * most, SUPINE_OK, NULL,
         "the lungs hold %.0f mL, as a child's may: for an adult, check the voxel spacing", ml);
 }
 
@@ -170,7 +179,7 @@ static void check_solid(checks *c, const supine_lungs *lungs, size_t lung) {
   }
   const double compactness = cbrt(36.0 * pi * volume * volume) / area;
   const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_LUNG_HOLLOW, compactness);
-  check(c, verdict != SUPINE_INPUT_REFUSED, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
+  check(c, verdict != SUPINE_INPUT_REFUSED, SUPINE_ERROR_MESH, NULL,
         "the %s lung holds %.0f mL within a surface of %.0f cm2, as a hollow shell does: fill the "
         "mask, or remove the surface inside the lung",
         supine_lungs_name(lungs, lung), lungs->volume[lung], 0.01 * area);
@@ -247,7 +256,7 @@ static void check_tip(checks *c, const supine_lungs *lungs, size_t lung, const t
   } else if (length < tip->least) {
     advice = "if the lung is cut off flat there, give a scan that shows all of it";
   }
-  check(c, length >= tip->least && length <= tip->most, refuse, SUPINE_REMEDY_NONE, NULL,
+  check(c, length >= tip->least && length <= tip->most, refuse, NULL,
         "the outermost %g %% of the %s lung towards the %s are %s%.0f mm long, up to "
         "%.0f,%.0f,%.0f mm (LPS): %s",
         100.0 * tip_share, supine_lungs_name(lungs, lung), tip->towards, at_least,
@@ -322,8 +331,7 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   SUPINE_ARENA arena = {0};
   uint32_t *corners = supine_arena_take(&arena, 3 * mesh->triangle_count, sizeof *corners);
   size_t *samples = supine_arena_take(&arena, mesh->vertex_count, sizeof *samples);
-  check(c, !arena.failed, SUPINE_ERROR_MEMORY, SUPINE_REMEDY_NONE, NULL,
-        "no memory for %zu components", parts);
+  check(c, !arena.failed, SUPINE_ERROR_MEMORY, NULL, "no memory for %zu components", parts);
   if (parts > 1) {
     for (size_t of = 0; of < parts && c->status == SUPINE_OK; ++of) {
       supine_inside_place deepest = {.depth = 0.0};
@@ -332,7 +340,7 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
         c->status = find_deepest(lungs, of, count, samples, corners, &deepest, c->error);
       }
       check(
-          c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH, SUPINE_REMEDY_NONE, NULL,
+          c, deepest.depth <= most_overlap, SUPINE_ERROR_MESH, NULL,
           "one of its surfaces reaches %.0f mm into another one, at %.0f,%.0f,%.0f mm (LPS): give "
           "both lungs in the axes of one scan, and remove surfaces inside a lung",
           deepest.depth, deepest.point[0], deepest.point[1], deepest.point[2]);
@@ -386,11 +394,15 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   const bool likely = supine_mesh_unit_is_likely(length, &unit);
   const bool given = c->source->units_given;
   char letters[4];
-  check(c, likely || unit == NULL, given ? SUPINE_OK : SUPINE_ERROR_MESH,
-        given ? SUPINE_REMEDY_UNIT_ADD : SUPINE_REMEDY_UNIT_OR_ACCEPT, unit,
+  supine_remedy units[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_give("units", unit != NULL ? unit : "", "")};
+  if (!given && length > SUPINE_MESH_ANIMAL_LEAST) {
+    units[1] = accept_size();
+  }
+  check(c, likely || unit == NULL, given ? SUPINE_OK : SUPINE_ERROR_MESH, units,
         "the lungs are %.3g mm long, which is impossible", length);
   check(
-      c, t->closed, SUPINE_ERROR_OPEN_SURFACE, SUPINE_REMEDY_NONE, NULL,
+      c, t->closed, SUPINE_ERROR_OPEN_SURFACE, NULL,
       "the surface is open (edges: %zu boundary, %zu non-manifold, %zu inconsistent) and encloses "
       "no volume: close its holes in a mesh editor, or give the label map that it was made from",
       t->boundary_edges, t->non_manifold_edges, t->inconsistent_edges);
@@ -398,14 +410,15 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
     SUPINE_ARENA arena = {0};
     supine_mesh parts[2];
     const size_t count = part_lungs(lungs, &arena, parts);
-    check(c, count > 0, SUPINE_ERROR_MEMORY, SUPINE_REMEDY_NONE, NULL,
-          "no memory for the two lungs");
+    check(c, count > 0, SUPINE_ERROR_MEMORY, NULL, "no memory for the two lungs");
     found = count > 0 ? supine_mesh_anatomy_find(parts, count) : found;
   }
   *side = found.side;
   *axes_hold = found.certain && found.axes == SUPINE_AXES_LPS;
   supine_mesh_axes_letters(supine_mesh_axes_after(c->source->axes, found.axes), letters);
-  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK, SUPINE_REMEDY_AXES_IF_RIGHT, letters,
+  const supine_remedy axes[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_give("axes", letters, "if these are the axes")};
+  check(c, found.axes == SUPINE_AXES_LPS, SUPINE_OK, axes,
         "the axes are doubtful: the shape of the lungs fits %s%s", letters,
         supine_mesh_axes_mirrored(found.axes)
             ? " (a scan pitched by more than 25 degrees has such a shape, too: turn it upright)"
@@ -415,9 +428,11 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
       check_tip(c, lungs, lung, &tips[i]);
     }
   }
+  const supine_remedy divide[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_give("labels", "one", "to divide the mask of a label map"),
+      supine_remedy_give("midline", "", "if it is a single lung")};
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
-        SUPINE_REMEDY_LUNGS_SEPARATE, NULL,
-        "this surface looks like both lungs in one piece: separate them");
+        divide, "this surface looks like both lungs in one piece: separate them");
   check_size(c, lungs, likely);
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
     check_solid(c, lungs, lung);
@@ -444,7 +459,9 @@ static supine_status take_side(const supine_mesh *meshes, size_t count,
                             taken > 0 ? ceil(high) : floor(low));
     supine_findings_note(findings, "%s: one lung, taken for the %s lung by its %s", source->name,
                          taken > 0 ? "left" : "right", side != 0 ? "shape" : "place");
-    supine_findings_advise(findings, SUPINE_REMEDY_MIDLINE, other_midline);
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_give("midline", other_midline, "if it is the other one")};
+    supine_findings_advise(findings, advice);
   }
   if (taken == lungs->side[0] && lungs->midline == midline) {
     return SUPINE_OK;

@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "base/vec3.h"
 
@@ -172,11 +173,12 @@ supine_status supine_patient_check_order(const supine_patient_pairs *pairs, doub
   const double beyond =
       opposite ? (fabs(landmarks) - growth_least) / supine_patient_growth_error(pairs) : 0.0;
   const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_LANDMARKS_ORDER, beyond);
-  SUPINE_REFUSE_IF(
-      verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_FORMAT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_set("reverse", "if the points are exchanged")};
+  SUPINE_REFUSE_ADVISE(
+      verdict == SUPINE_INPUT_REFUSED, error, advice, SUPINE_ERROR_FORMAT,
       "from the first to the second points, the landmarks grow to %.0f %% of their volume, but the "
-      "lungs to %.0f %%: first and second points, or the states, are exchanged; reverse the "
-      "landmarks",
+      "lungs to %.0f %%: first and second points, or the states, are exchanged",
       100.0 * exp(landmarks), 100.0 * growth);
   return SUPINE_OK;
 }

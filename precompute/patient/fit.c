@@ -11,6 +11,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 
 enum {
@@ -321,7 +322,8 @@ supine_status supine_patient_fit(const supine_patient_fit_options *options,
   const size_t points = single + triples;
   const size_t constants = options->law == SUPINE_PATIENT_PAPER ? SUPINE_PATIENT_CONSTANTS : 1;
   const size_t unknowns = constants + options->scan_motion;
-  SUPINE_REFUSE_ADVISE(points < unknowns, error, SUPINE_REMEDY_LAW_DEEP, SUPINE_ERROR_FORMAT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("law", "deep", "")};
+  SUPINE_REFUSE_ADVISE(points < unknowns, error, advice, SUPINE_ERROR_FORMAT,
                        "points: %zu, fewer than the %zu unknowns of the %s law: give more points",
                        points, unknowns, supine_patient_law_names[options->law]);
   SUPINE_ARENA arena = {0};

@@ -11,6 +11,7 @@
 
 #include "base/arena.h"
 #include "base/csv.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "base/vec3.h"
 #include "runtime/rigid.h"
@@ -265,9 +266,10 @@ supine_status supine_patient_pairs_check(const supine_patient_pairs *pairs, bool
                    "the two states differ by %sa rotation of %.0f degrees: give both in LPS axes "
                    "(x to the left, y to the back, z to the head)",
                    s.growth < 0.0 ? "a reflection and " : "", s.rotation);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_set("translation", ""),
+                                                     supine_remedy_set("rigid", "")};
   SUPINE_REFUSE_ADVISE(
-      !scans_moved && s.translation > apart_most * s.spread[0], error, SUPINE_REMEDY_SCAN_MOTION,
-      SUPINE_ERROR_FORMAT,
+      !scans_moved && s.translation > apart_most * s.spread[0], error, advice, SUPINE_ERROR_FORMAT,
       "the centres of the two states are %.0f mm apart: give all points in one coordinate frame, "
       "or fit the motion between the scans",
       s.translation);

@@ -12,6 +12,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "precompute/lungs/surface.h"
 
 void supine_patient_scans_free(supine_patient_scans *scans) {
@@ -110,7 +111,9 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
                            "scans and their states, but %.0f %% in healthy people and %.0f %% in "
                            "COPD, supine",
                            100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
-      supine_findings_advise(&scans->findings, SUPINE_REMEDY_REST_CHECK, NULL);
+      const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+          supine_remedy_change("rest", "if it is not the state of that scan")};
+      supine_findings_advise(&scans->findings, advice);
     }
   }
 }
@@ -198,10 +201,12 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
     doubt += supine_input_get(SUPINE_INPUT_LANDMARKS_ORDER)->refused *
              supine_patient_growth_error(&scans->pairs);
   }
+  const supine_remedy reverse[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_set("reverse", "if the landmarks begin in the fuller scan")};
   SUPINE_REFUSE_ADVISE((named > 0 && growth < 1.0 - doubt) || (named < 0 && growth > 1.0 + doubt),
-                       error, SUPINE_REMEDY_SCANS_EXCHANGE, SUPINE_ERROR_FORMAT,
+                       error, reverse, SUPINE_ERROR_FORMAT,
                        "the scan given as the fuller one has only %.0f %% of the volume of the "
-                       "other scan",
+                       "other scan: exchange the states",
                        100.0 * (named > 0 ? growth : 1.0 / growth));
   if (record->from_surface && scans->pairs.count > 0) {
     SUPINE_TRY(supine_patient_check_order(&scans->pairs, growth, error));
@@ -223,7 +228,9 @@ supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_pat
   }
   set_states(scans, record);
   const bool volumes_known = record->volume[0] > 0.0 && record->volume[1] > 0.0;
-  SUPINE_REFUSE_ADVISE(!record->from_surface && !volumes_known, error, SUPINE_REMEDY_SCANS_VOLUMES,
+  const supine_remedy volumes[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_such_as("rest", "2600mL", "with the other volume")};
+  SUPINE_REFUSE_ADVISE(!record->from_surface && !volumes_known, error, volumes,
                        SUPINE_ERROR_ARGUMENT,
                        "landmarks do not show the volume of the lungs, which decides what rest and "
                        "full inflation are: give both surfaces, or both volumes of gas and tissue");

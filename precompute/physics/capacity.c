@@ -13,6 +13,7 @@
 #include <supine/inputs.h>
 
 #include "base/number.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "precompute/physics/reference.h"
 
@@ -110,6 +111,24 @@ void supine_physics_reference_compare(const supine_reference *reference,
                   part * range[1]);
 }
 
+/* Warn if the scan does not hold what its state and the given volume at rest say. */
+static void doubt_rest(const supine_state *state, double held, const supine_resting *given,
+                       supine_findings *findings) {
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("scanned", ""),
+                                                     supine_remedy_change("resting", "")};
+  for (size_t axis = 0; axis < 6; ++axis) {
+    const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
+    const double ml = given->ml[axis] + state->volume.ml;
+    if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
+      supine_findings_warn(findings,
+                           "the scan holds %.0f mL, but its state and the volume at "
+                           "rest say %.0f mL",
+                           held, ml);
+      supine_findings_advise(findings, advice);
+    }
+  }
+}
+
 void supine_physics_reference_doubt(const supine_reference *reference, const supine_person *person,
                                     const supine_resting *given, supine_findings *findings) {
   const supine_state *state = &reference->scan.state;
@@ -128,17 +147,7 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
     held += reference->full_volume[lung] + reference->scan_volume[lung];
   }
   if (at_rest) {
-    for (size_t axis = 0; axis < 6; ++axis) {
-      const double along = (axis % 2 == 0 ? 1.0 : -1.0) * state->gravity[axis / 2];
-      const double ml = given->ml[axis] + state->volume.ml;
-      if (along > 1.0 - 1e-9 && given->ml[axis] > 0.0 && fabs(held - ml) > agreement * ml) {
-        supine_findings_warn(findings,
-                             "the scan holds %.0f mL, but its state and the volume at "
-                             "rest say %.0f mL",
-                             held, ml);
-        supine_findings_advise(findings, SUPINE_REMEDY_SCAN_OR_REST, NULL);
-      }
-    }
+    doubt_rest(state, held, given, findings);
   }
   const double gas =
       supine_physics_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
@@ -156,13 +165,20 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
         full, expected, held_gas, part * SUPINE_RESIDUAL_ML,
         is_small ? "; they are too small for an adult, and all constants are an adult's" : "",
         at_rest ? "check the voxel spacing" : "the scan was probably not at full inflation");
-    supine_findings_advise(
-        findings, at_rest ? SUPINE_REMEDY_SCAN_EMPTIER : SUPINE_REMEDY_SCAN_NOT_FULL, NULL);
+    const supine_remedy of_rest[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_change("resting", ""),
+        supine_remedy_such_as("scanned", "supine:rest-300", "if the scan was emptier than rest")};
+    const supine_remedy of_full[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_such_as("scanned", "supine:rest", "or full-1000")};
+    supine_findings_advise(findings, at_rest ? of_rest : of_full);
   } else if (full > part * most_ml) {
     supine_findings_warn(
         findings, "at full inflation the lungs hold %.0f mL (%s mL)%s", full, expected,
         at_rest ? "" : ": check the voxel spacing or the unit, and that all of the mask is lung");
-    supine_findings_advise(findings, at_rest ? SUPINE_REMEDY_SCAN_OVER_REST : SUPINE_REMEDY_NONE,
-                           NULL);
+    const supine_remedy fuller[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_such_as("scanned", "supine:rest+1000", "if the scan was fuller than rest"),
+        supine_remedy_change("resting", "")};
+    const supine_remedy none[SUPINE_REMEDIES_MAX] = {{.kind = SUPINE_REMEDY_NONE}};
+    supine_findings_advise(findings, at_rest ? fuller : none);
   }
 }

@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 
 #include "precompute/physics/force.h"
@@ -127,6 +128,7 @@ supine_status supine_physics_directions(const supine_lungs *lungs, const supine_
   }
   (void)supine_error_set(error, SUPINE_ERROR_MESH,
                          "no vertex is displaced: the constants C1, C3 and C5 are all 0");
-  supine_error_advise(error, SUPINE_REMEDY_CONSTANTS, NULL);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("constants", "")};
+  supine_error_advise(error, advice);
   return SUPINE_ERROR_MESH;
 }

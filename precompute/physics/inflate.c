@@ -14,6 +14,7 @@
 #include <supine/volume.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "precompute/physics/reference.h"
 #include "precompute/physics/solve.h"
@@ -48,13 +49,24 @@ typedef struct ascent {
   size_t history; /* number of stored changes that the acceleration uses, at most DEPTH */
 } ascent;
 
+/* Advise on a scan from which full inflation is not found. */
+static supine_status advise(supine_error *error) {
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_change("scanned", "if the scan is fuller"), supine_remedy_change("resting", ""),
+      supine_remedy_give("scanned", "none", "to use the scan as it is")};
+  return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);
+}
+
 static supine_status check_folds(const ascent *a, supine_error *error) {
   const double share = supine_mesh_turned_over(&a->scan.mesh, a->estimate.mesh.vertices);
-  SUPINE_REFUSE_ADVISE(
-      !(share <= folded_share), error, SUPINE_REMEDY_SCAN_FULLER, SUPINE_ERROR_NUMERICAL,
+  if (share <= folded_share) {
+    return SUPINE_OK;
+  }
+  (void)supine_error_set(
+      error, SUPINE_ERROR_NUMERICAL,
       "the scan folds on its way to full inflation: %.3g %% of its triangles turn over",
       100.0 * share);
-  return SUPINE_OK;
+  return advise(error);
 }
 
 /* Find the gains A of one lung in the scan: factors of its displacement along x, y and z, which are
@@ -99,7 +111,9 @@ static supine_status find_lung_gains(const supine_volume_form *form, const doubl
   }
   (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                          "no path from full inflation through the scan to rest was found");
-  supine_error_advise(error, SUPINE_REMEDY_SCAN_OR_REST, NULL);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("scanned", ""),
+                                                     supine_remedy_change("resting", "")};
+  supine_error_advise(error, advice);
   return SUPINE_ERROR_NUMERICAL;
 }
 
@@ -182,8 +196,12 @@ static supine_status advance(ascent *a, supine_error *error) {
     failed =
         LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', (lapack_int)n, 1, matrix, (lapack_int)n, weights, 1);
   }
-  SUPINE_REFUSE_ADVISE(failed != 0, error, SUPINE_REMEDY_SCAN_FULLER, SUPINE_ERROR_NUMERICAL,
-                       "no surface at full inflation was found: the iteration does not progress");
+  if (failed != 0) {
+    (void)supine_error_set(
+        error, SUPINE_ERROR_NUMERICAL,
+        "no surface at full inflation was found: the iteration does not progress");
+    return advise(error);
+  }
   double *to = a->estimate.mesh.vertices;
   memcpy(to, a->map, a->size * sizeof *to);
   for (size_t j = 0; j < n; ++j) {
@@ -215,8 +233,7 @@ static supine_status iterate(ascent *a, supine_error *error) {
                          "no surface at full inflation was found: after %d steps it still changes "
                          "by %s mm RMS",
                          SOLVES_MAX, supine_text_distance(a->rms).text);
-  supine_error_advise(error, SUPINE_REMEDY_SCAN_FULLER, NULL);
-  return SUPINE_ERROR_NUMERICAL;
+  return advise(error);
 }
 
 supine_status supine_physics_reference_inflate(supine_lungs *lungs, const supine_model *model,

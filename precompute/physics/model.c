@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "precompute/physics/model.h"
 
@@ -29,8 +30,10 @@ const char *const supine_physics_law_names[SUPINE_LAW_COUNT + 1] = {SUPINE_LAWS(
 supine_status supine_physics_model_equilibrium(const supine_lungs *lungs, const supine_model *model,
                                                supine_equilibrium **equilibrium,
                                                supine_error *error) {
-  SUPINE_REFUSE_ADVISE(model->force.soften != 0.0 && !(model->reach > 0.0), error,
-                       SUPINE_REMEDY_REACH, SUPINE_ERROR_ARGUMENT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("reach", "10", ""),
+                                                     supine_remedy_omit("soften")};
+  SUPINE_REFUSE_ADVISE(model->force.soften != 0.0 && !(model->reach > 0.0), error, advice,
+                       SUPINE_ERROR_ARGUMENT,
                        "softening needs the distance over which a force spreads");
   /* A longer smoothing length would spread every force evenly and make the matrix singular. */
   const double longest = 0.5 * supine_distance(lungs->minimum, lungs->maximum);

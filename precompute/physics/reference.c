@@ -6,6 +6,7 @@
 #include <supine/volume.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "precompute/physics/reference.h"
 
 static const double tissue_share = 0.1; /* volume of the tissue as a share of the full volume */
@@ -115,7 +116,8 @@ static supine_status find_full(supine_reference *found, const double *volume, su
                            held, text,
                            beyond_full ? "it is beyond full inflation"
                                        : "it is less than the tissue, 10 % of full inflation");
-    supine_error_advise(error, SUPINE_REMEDY_SCAN_STATE, NULL);
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("scanned", "")};
+    supine_error_advise(error, advice);
     return SUPINE_ERROR_ARGUMENT;
   }
   return SUPINE_OK;
@@ -133,8 +135,10 @@ static supine_status find_rest(supine_reference *found, const double *volume, su
     status = find_full(found, volume, error);
   }
   SUPINE_TRY(status);
-  SUPINE_REFUSE_ADVISE(!(fabs(off - 1.0) <= 1e-9), error, SUPINE_REMEDY_SCAN_FULL_OR_REST,
-                       SUPINE_ERROR_ARGUMENT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("full", ""),
+                                                     supine_remedy_change("scanned", ""),
+                                                     supine_remedy_change("resting", "")};
+  SUPINE_REFUSE_ADVISE(!(fabs(off - 1.0) <= 1e-9), error, advice, SUPINE_ERROR_ARGUMENT,
                        "a scan of %.0f mL at rest does not belong to lungs of %.0f mL at full "
                        "inflation",
                        volume[0] + volume[1], found->scan.full);

@@ -13,6 +13,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/quantity.h"
+#include "base/remedy.h"
 #include "base/text.h"
 
 /* Volumes at rest of healthy people divided by the volume at full inflation supine, both with
@@ -205,12 +206,15 @@ supine_status supine_physics_resting_settle(supine_resting *resting, size_t coun
       }
       fits = fits && is_share(*share);
     }
-    SUPINE_REFUSE_ADVISE(
-        !relative && !fits, error, SUPINE_REMEDY_SCAN_OR_REST_GIVE, SUPINE_ERROR_ARGUMENT,
-        "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
-        "posture %s",
-        full[0] + (count > 1 ? full[1] : 0.0), at_rest(resting, axis, count, side, full),
-        supine_physics_resting_names[axis]);
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_such_as("scanned", "supine:rest", "if the scan was not at full inflation"),
+        supine_remedy_change("resting", "")};
+    SUPINE_REFUSE_ADVISE(!relative && !fits, error, advice, SUPINE_ERROR_ARGUMENT,
+                         "lungs with a full volume of %.0f mL do not hold %.0f mL at rest in "
+                         "posture %s",
+                         full[0] + (count > 1 ? full[1] : 0.0),
+                         at_rest(resting, axis, count, side, full),
+                         supine_physics_resting_names[axis]);
     resting->ml[axis] = relative ? resting->ml[axis] : 0.0;
   }
   return SUPINE_OK;

@@ -7,6 +7,7 @@
 
 #include "precompute/posed/located.h"
 
+#include "base/remedy.h"
 #include "base/text.h"
 
 static const char *const postures[SUPINE_POSED_POSTURES] = {"supine", "prone",   "left",
@@ -72,11 +73,10 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
   static const struct {
     const char *way;
     double factor[3];
-    supine_remedy remedy;
-    const char *value;
-  } readings[] = {{"in centimetres", {10.0, 10.0, 10.0}, SUPINE_REMEDY_UNIT_ADD, "cm"},
-                  {"in RAS", {-1.0, -1.0, 1.0}, SUPINE_REMEDY_AXES_ADD, "RAS"},
-                  {"mirrored", {-1.0, 1.0, 1.0}, SUPINE_REMEDY_AXES_ADD, "RPS"}};
+    const char *argument, *value;
+  } readings[] = {{"in centimetres", {10.0, 10.0, 10.0}, "units", "cm"},
+                  {"in RAS", {-1.0, -1.0, 1.0}, "axes", "RAS"},
+                  {"mirrored", {-1.0, 1.0, 1.0}, "axes", "RPS"}};
   supine_observation other[SUPINE_LOCATE_POINTS_MAX];
   supine_locate_task changed = *task;
   double most = residual_most;
@@ -94,7 +94,9 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
           10.0 * pow(located->best->residual_rms, 2.0) < most * most) {
         supine_text_add(error->message, sizeof error->message, ". Read %s, they fit within %.1f mm",
                         readings[i].way, located->best->residual_rms);
-        supine_error_advise(error, readings[i].remedy, readings[i].value);
+        const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+            supine_remedy_give(readings[i].argument, readings[i].value, "")};
+        supine_error_advise(error, advice);
         return;
       }
     }

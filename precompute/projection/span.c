@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "base/lapack.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "precompute/projection/projection.h"
 
@@ -97,7 +98,7 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   const bool spanned = choose(residual, count, law->soften == 0.0 ? rounding : tolerance,
                               &span->rank, rows, columns);
   SUPINE_REFUSE_IF(!spanned, error, SUPINE_ERROR_ARGUMENT,
-                   "softening by %g is too large for a basis file: give at most 12", law->soften);
+                   "softening by %g is too large for a basis of these lungs: give less", law->soften);
   for (size_t r = 0; r < span->rank; ++r) {
     memcpy(span->directions + 3 * r, directions + 3 * columns[r], 3 * sizeof *directions);
     span->vertices[r] = vertices[rows[r]];
@@ -110,7 +111,9 @@ supine_status supine_projection_span_create(const supine_lungs *lungs, const sup
   if (status == SUPINE_ERROR_MEMORY) {
     return supine_error_memory(error, "the forces");
   }
-  SUPINE_REFUSE_ADVISE(status != SUPINE_OK, error, SUPINE_REMEDY_FORCE, SUPINE_ERROR_NUMERICAL,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("base", ""),
+                                                     supine_remedy_change("gain", "")};
+  SUPINE_REFUSE_ADVISE(status != SUPINE_OK, error, advice, SUPINE_ERROR_NUMERICAL,
                        "the force is zero everywhere");
   return SUPINE_OK;
 }

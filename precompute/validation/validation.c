@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/lungs/surface.h"
@@ -53,7 +54,9 @@ static supine_status find_pose(const supine_validation *s, const supine_validati
                                supine_error *error) {
   supine_state asked = state->state;
   if (asked.volume.kind == SUPINE_VOLUME_DEFAULT) {
-    SUPINE_REFUSE_ADVISE(scan == NULL, error, SUPINE_REMEDY_OTHER_STATE, SUPINE_ERROR_ARGUMENT,
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_such_as("to", "supine:rest", "")};
+    SUPINE_REFUSE_ADVISE(scan == NULL, error, advice, SUPINE_ERROR_ARGUMENT,
                          "the volume of the other state is unknown, and landmarks do not give it");
     asked.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, 1e-3 * supine_mesh_volume(scan)};
   }
@@ -250,8 +253,9 @@ static supine_status check_points(const supine_validation *s, const supine_patie
     outside += p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] ||
                p[2] < low[2] || p[2] > high[2];
   }
-  SUPINE_REFUSE_ADVISE(2 * outside > pairs->count, error, SUPINE_REMEDY_POINTS_REVERSE,
-                       SUPINE_ERROR_FORMAT,
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_set("reverse", "if first and second points are exchanged")};
+  SUPINE_REFUSE_ADVISE(2 * outside > pairs->count, error, advice, SUPINE_ERROR_FORMAT,
                        "%zu of %zu landmarks lie outside the lungs' bounding box: check their "
                        "frame, unit and patient",
                        outside, pairs->count);

@@ -75,8 +75,10 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
   const supine_tensor *size = supine_basis_tensor(basis, "grid_size");
   const supine_tensor *of = supine_basis_tensor(basis, "part");
   const supine_tensor *deep = supine_basis_tensor(basis, "depth");
-  SUPINE_REFUSE_ADVISE(grid == NULL || size == NULL || of == NULL || deep == NULL, error,
-                       SUPINE_REMEDY_GRID, SUPINE_ERROR_FORMAT, "the basis holds no grid");
+  SUPINE_REFUSE_IF(
+      grid == NULL || size == NULL || of == NULL || deep == NULL, error, SUPINE_ERROR_FORMAT,
+      "the basis holds no grid: embed an image, or a grid with a spacing such as 8 mm, "
+      "in the basis of the lungs");
   bool valid = grid->dtype == SUPINE_F64 && grid->rank == 2 && grid->shape[0] == 4 &&
                grid->shape[1] == 3 && size->dtype == SUPINE_U32 && size->rank == 1 &&
                size->shape[0] == 3 && of->dtype == SUPINE_U32 && of->rank == 1 &&

@@ -8,6 +8,7 @@
 #include "base/arena.h"
 #include "base/clones.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/vec3.h"
 
 #include "precompute/warp/run.h"
@@ -361,8 +362,9 @@ bool supine_warp_is_hounsfield(const supine_image *image) {
 supine_status supine_warp_check_hounsfield(const supine_image *image, const char *path,
                                            supine_error *error) {
   const bool aerated = supine_warp_is_hounsfield(image);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("density")};
   SUPINE_REFUSE_ADVISE(
-      !aerated, error, SUPINE_REMEDY_DENSITY, SUPINE_ERROR_FORMAT,
+      !aerated, error, advice, SUPINE_ERROR_FORMAT,
       "%s: no voxel is below %g, so the image is not in Hounsfield units: convert it", path,
       supine_warp_aerated);
   return SUPINE_OK;

@@ -31,6 +31,13 @@ void supine_options_say(const char *command, const char *format, ...) {
   (void)fprintf(stderr, "supine %s: %s\n", command, printable);
 }
 
+supine_explained supine_options_explain(const supine_error *error) {
+  supine_explained explained;
+  (void)snprintf(explained.text, sizeof explained.text, "%s", error->message);
+  supine_remedies_add(error->remedies, SUPINE_WORDS_COMMAND, explained.text, sizeof explained.text);
+  return explained;
+}
+
 int supine_options_finish(const char *command) {
   errno = 0;
   if (ferror(stdout) != 0 || fflush(stdout) != 0) {

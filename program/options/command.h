@@ -25,6 +25,13 @@ enum {
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
+/* An error's message, and what to do. */
+typedef struct supine_explained {
+  char text[1024];
+} supine_explained;
+
+supine_explained supine_options_explain(const supine_error *error);
+
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 

@@ -16,7 +16,6 @@
 #include "base/text.h"
 
 #include "program/options/command.h"
-#include "program/options/remedy.h"
 
 /* getopt() returns FIRST_LONG + i for the long option of rows[i]. */
 enum { ROWS_MAX = 64, HELP_ALL = 256, FIRST_LONG };

@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "precompute/posed/posed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
@@ -187,9 +188,9 @@ static supine_status refuse_or_warn(const char *command, const supine_state *sta
                                     const char *wrong, bool allowed, supine_error *error) {
   char text[160];
   (void)supine_state_describe(state, text, sizeof text);
-  SUPINE_REFUSE_IF(!allowed, error, SUPINE_ERROR_NUMERICAL,
-                   "%s: %s: choose a volume nearer to rest, or accept this with --allow-folds",
-                   text, wrong);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_allow_folds()};
+  SUPINE_REFUSE_ADVISE(!allowed, error, advice, SUPINE_ERROR_NUMERICAL,
+                       "%s: %s: choose a volume nearer to rest", text, wrong);
   supine_options_say(command, "warning: %s: %s", text, wrong);
   return SUPINE_OK;
 }

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/ascii.h"
-#include "program/options/remedy.h"
+#include "program/options/command.h"
 #include "program/options/surface_options.h"
 
 static supine_status read_axes(const char *text, void *field, supine_error *error) {
@@ -59,10 +59,10 @@ const supine_option supine_options_landmarks[] = {
 void supine_options_say_findings(const char *command, const supine_findings *findings) {
   for (size_t i = 0; i < findings->count; ++i) {
     const supine_finding *found = &findings->list[i];
-    char words[SUPINE_REMEDY_WORDS];
-    supine_options_remedy_words(found->remedy, found->value, words);
-    supine_options_say(command, "%s: %s%s", found->is_warning ? "warning" : "note", found->text,
-                       words);
+    char text[1024];
+    (void)snprintf(text, sizeof text, "%s", found->text);
+    supine_remedies_add(found->remedies, SUPINE_WORDS_COMMAND, text, sizeof text);
+    supine_options_say(command, "%s: %s", found->is_warning ? "warning" : "note", text);
   }
   if (findings->dropped > 0) {
     supine_options_say(command, "warning: and %zu more", findings->dropped);

@@ -9,7 +9,7 @@
 
 #include "base/arena.h"
 #include "base/vec3.h"
-#include "program/options/remedy.h"
+#include "program/options/command.h"
 #include "program/report/comparison.h"
 
 static const char command[] = "compare";

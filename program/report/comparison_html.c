@@ -8,7 +8,7 @@
 
 #include "base/locale.h"
 #include "program/options/basis_input.h"
-#include "program/options/remedy.h"
+#include "program/options/command.h"
 #include "program/report/comparison.h"
 #include "program/view/export/template.h"
 

@@ -9,7 +9,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "program/options/basis_input.h"
-#include "program/options/remedy.h"
+#include "program/options/command.h"
 #include "program/stream/tracked_patient.h"
 
 supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const supine_pv *pv,

@@ -6,16 +6,15 @@
 const STATE = 128;
 const POSE = 8 * (256 + 3 * 16 + 1 + 16);
 const VOLUMES = 8 * 16;
-const TEXT = 512;
-const VALUE = 32;
-const ERROR = 4 + 512 + 4 + VALUE;
+const MESSAGE = 512;
+const TEXT = 2 * MESSAGE; // a message, and what to do
+const REMEDY = 4 + 4 + 32 + 4;
+const ERROR = 4 + MESSAGE + 3 * REMEDY;
 const OPTIONS = 16;
 const EXACT = 1; // SUPINE_STORAGE_EXACT
 const FRAME = 24; // SUPINE_GL_FRAME_FLOATS
 const KINDS_OF_VOLUME = { rest: 1, full: 2, scan: 3 }; // supine_volume_kind
-// What to do about an error, after its message: words for each supine_remedy of this library, in the order of the enum.
-const REMEDIES = ['', ", or use a basis that 'supine precompute' made without --scanned none and --law paper",
-  ", or open the basis with allowFolds"];
+const JAVASCRIPT = 2; // SUPINE_WORDS_JAVASCRIPT
 const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a smaller gain';
 /** Metadata "checksum" of a file that open() completes (its option `seal`). */
 export const UNSEALED = 'xxh64:0000000000000000';
@@ -362,7 +361,7 @@ class Basis {
 
   #write(text) {
     const bytes = new TextEncoder().encode(`${text}\0`);
-    if (bytes.length > TEXT) throw refusal(`the text has ${bytes.length - 1} bytes: give at most ${TEXT - 1}`);
+    if (bytes.length > MESSAGE) throw refusal(`the text has ${bytes.length - 1} bytes: give at most ${MESSAGE - 1}`);
     this.#view(Uint8Array, this.#text, bytes.length).set(bytes);
     return this.#text;
   }
@@ -374,8 +373,11 @@ class Basis {
 
   #check(status, message) {
     if (status === 0) return;
-    const remedy = REMEDIES[this.#word(this.#error + 4 + TEXT)] ?? '';
-    throw new SupineError(message || this.#string(this.#error + 4) + remedy, status);
+    if (!message) {
+      new Uint8Array(this.#c.memory.buffer).copyWithin(this.#text, this.#error + 4, this.#error + 4 + MESSAGE);
+      this.#c.supine_remedies_add(this.#error + 4 + MESSAGE, JAVASCRIPT, this.#text, TEXT);
+    }
+    throw new SupineError(message || this.#string(this.#text), status);
   }
 
   #evaluate(status) {

@@ -11,6 +11,7 @@
 #include "base/number.h"
 #include "base/output.h"
 #include "base/parallel.h"
+#include "base/remedy.h"
 #include "base/text.h"
 #include "tests/helpers/findings.h"
 #include "tests/helpers/test.h"
@@ -35,24 +36,25 @@ TEST(test_error_wrap_cause_with_remedy_keeps_it) {
   supine_error cause;
   supine_error error;
   (void)supine_error_set(&cause, SUPINE_ERROR_MESH, "the axes are doubtful");
-  assert_int_equal(cause.remedy, SUPINE_REMEDY_NONE);
-  supine_error_advise(&cause, SUPINE_REMEDY_AXES_ADD, "RAS");
+  assert_int_equal(cause.remedies[0].kind, SUPINE_REMEDY_NONE);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("axes", "RAS", "")};
+  supine_error_advise(&cause, advice);
   assert_int_equal(supine_error_wrap(&error, &cause, "%s: ", "left.ply"), SUPINE_ERROR_MESH);
   assert_int_equal(error.status, SUPINE_ERROR_MESH);
   assert_string_equal(error.message, "left.ply: the axes are doubtful");
-  assert_int_equal(error.remedy, SUPINE_REMEDY_AXES_ADD);
-  assert_string_equal(error.value, "RAS");
+  assert_int_equal(error.remedies[0].kind, SUPINE_REMEDY_GIVE);
+  assert_string_equal(error.remedies[0].value, "RAS");
   assert_int_equal(supine_error_wrap(NULL, &cause, "x: "), SUPINE_ERROR_MESH);
-  supine_error_advise(NULL, SUPINE_REMEDY_AXES_ADD, "RAS");
+  supine_error_advise(NULL, advice);
 }
 
 TEST(test_error_set_after_remedy_clears_it) {
   supine_error error;
   (void)supine_error_set(&error, SUPINE_ERROR_MESH, "first");
-  supine_error_advise(&error, SUPINE_REMEDY_UNIT_ADD, "cm");
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("band")};
+  supine_error_advise(&error, advice);
   (void)supine_error_set(&error, SUPINE_ERROR_READ, "second");
-  assert_int_equal(error.remedy, SUPINE_REMEDY_NONE);
-  assert_string_equal(error.value, "");
+  assert_int_equal(error.remedies[0].kind, SUPINE_REMEDY_NONE);
 }
 
 /* Each finding has its own remedy, and control characters of names are escaped. */
@@ -60,13 +62,13 @@ TEST(test_findings_advise_each_finding_keeps_its_own) {
   static supine_findings findings;
   supine_findings_note(&findings, "a\nb: %s", "first");
   supine_findings_warn(&findings, "second");
-  supine_findings_advise(&findings, SUPINE_REMEDY_MIDLINE, "-12");
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_give("midline", "-12", "")};
+  supine_findings_advise(&findings, advice);
   assert_string_equal(findings_text(&findings), "note: a\\x0Ab: first\nwarning: second\n");
-  assert_int_equal(findings.list[0].remedy, SUPINE_REMEDY_NONE);
-  assert_int_equal(findings.list[1].remedy, SUPINE_REMEDY_MIDLINE);
-  assert_string_equal(findings.list[1].value, "-12");
+  assert_int_equal(findings.list[0].remedies[0].kind, SUPINE_REMEDY_NONE);
+  assert_string_equal(findings.list[1].remedies[0].value, "-12");
   supine_findings_warn(NULL, "nobody asks");
-  supine_findings_advise(NULL, SUPINE_REMEDY_EDGE, NULL);
+  supine_findings_advise(NULL, advice);
 }
 
 /* What has no room is counted, and its remedy does not become that of another finding. */
@@ -75,11 +77,52 @@ TEST(test_findings_warn_full_list_counts_dropped) {
   for (size_t i = 0; i < SUPINE_FINDINGS_MAX + 2; ++i) {
     supine_findings_warn(&findings, "%zu", i);
   }
-  supine_findings_advise(&findings, SUPINE_REMEDY_EDGE, NULL);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_change("edge", "")};
+  supine_findings_advise(&findings, advice);
   assert_int_equal(findings.count, SUPINE_FINDINGS_MAX);
   assert_int_equal(findings.dropped, 2);
   assert_string_equal(findings.list[SUPINE_FINDINGS_MAX - 1].text, "31");
-  assert_int_equal(findings.list[SUPINE_FINDINGS_MAX - 1].remedy, SUPINE_REMEDY_NONE);
+  assert_int_equal(findings.list[SUPINE_FINDINGS_MAX - 1].remedies[0].kind, SUPINE_REMEDY_NONE);
+}
+
+/* Each kind of remedy, as each host writes arguments. */
+TEST(test_remedies_add_each_host_its_words) {
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_give("held_out", "5", ""),
+      supine_remedy_such_as("scanned", "supine:rest", "if it is not full"),
+      supine_remedy_omit("without_normals")};
+  const supine_remedy change[SUPINE_REMEDIES_MAX] = {supine_remedy_change("axes", ""),
+                                                     supine_remedy_give("axes", "LPS", "")};
+  static const char *const expected[] = {
+      "bad; give --held-out 5, or give --scanned, such as supine:rest, if it is not full, or leave "
+      "--without-normals out",
+      "bad; give held_out=5, or give scanned, such as supine:rest, if it is not full, or leave "
+      "without_normals out",
+      "bad; give heldOut: 5, or give scanned, such as supine:rest, if it is not full, or leave "
+      "withoutNormals out"};
+  char text[1024];
+  for (size_t words = 0; words < sizeof expected / sizeof *expected; ++words) {
+    (void)snprintf(text, sizeof text, "bad");
+    supine_remedies_add(advice, (supine_words)words, text, sizeof text);
+    assert_string_equal(text, expected[words]);
+  }
+  (void)snprintf(text, sizeof text, "which?");
+  supine_remedies_add(change, SUPINE_WORDS_PYTHON, text, sizeof text);
+  assert_string_equal(text, "which? Change axes, or give axes='LPS'");
+  const supine_remedy set[SUPINE_REMEDIES_MAX] = {
+      supine_remedy_set("allow_folds", ""), supine_remedy_give("axes", "RAS", "if it is in RAS")};
+  static const char *const switched[] = {
+      "bad. Give --allow-folds, or give --axes RAS if it is in RAS",
+      "bad. Give allow_folds=True, or give axes='RAS' if it is in RAS",
+      "bad. Give allowFolds: true, or give axes: 'RAS' if it is in RAS"};
+  for (size_t words = 0; words < sizeof switched / sizeof *switched; ++words) {
+    (void)snprintf(text, sizeof text, "bad.");
+    supine_remedies_add(set, (supine_words)words, text, sizeof text);
+    assert_string_equal(text, switched[words]);
+  }
+  char small[12] = "bad";
+  supine_remedies_add(advice, SUPINE_WORDS_COMMAND, small, sizeof small);
+  assert_string_equal(small, "bad; give -");
 }
 
 TEST(test_error_set_long_message_truncated) {

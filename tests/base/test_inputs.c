@@ -44,7 +44,7 @@ static void print_table(FILE *file) {
       group = input->group;
       fprintf(file,
               "\n## %s\n\n| check | input | compared with | measured | told | refused | evidence | "
-              "people, n | remedy | through |\n|---|---|---|---|---|---|---|---|---|---|\n",
+              "people, n | through |\n|---|---|---|---|---|---|---|---|---|\n",
               group);
     }
     fprintf(file, "| %s | %s | %s | %s |", input->name, input->input, input->against,
@@ -57,7 +57,7 @@ static void print_table(FILE *file) {
     } else {
       fprintf(file, " |");
     }
-    fprintf(file, " %s | %s |\n", input->remedy, interfaces_of(input->interfaces));
+    fprintf(file, " %s |\n", interfaces_of(input->interfaces));
   }
 }
 
@@ -70,7 +70,6 @@ TEST(test_input_get_every_row_complete) {
     assert_non_null(input->against);
     assert_non_null(input->measured);
     assert_non_null(input->evidence);
-    assert_non_null(input->remedy);
     assert_true(input->interfaces != 0);
     assert_false(isnan(input->told) && isnan(input->refused));
     for (int other = 0; other < id; ++other) {

@@ -44,7 +44,7 @@ class Row(ctypes.Structure):
     _fields_ = [*((name, ctypes.c_char_p) for name in ("name", "group", "input", "against", "measured")),
                 ("below", ctypes.c_bool), ("told", ctypes.c_double), ("refused", ctypes.c_double),
                 ("evidence", ctypes.c_char_p), ("people", ctypes.c_int), ("n", ctypes.c_int),
-                ("remedy", ctypes.c_char_p), ("interfaces", ctypes.c_uint)]
+                ("interfaces", ctypes.c_uint)]
 
 
 def table():
@@ -166,3 +166,34 @@ def write_ply(target, vertices, faces):
                    "end_header\n")
         np.savetxt(file, vertices, "%.6f")
         np.savetxt(file, np.column_stack([np.full(len(faces), 3), faces]), "%d")
+
+
+def write_points(name, rows):
+    with open(name, "w", encoding="utf-8") as file:
+        file.write("name,x,y,z\n" + "".join("%s,%.3f,%.3f,%.3f\n" % row for row in rows))
+
+
+def write_pairs(name, rows):
+    with open(name, "w", encoding="utf-8") as file:
+        file.write("x,y,z,to_x,to_y,to_z\n")
+        np.savetxt(file, rows, "%.4f", ",")
+
+
+def write_image(name, image):
+    kind = {"uint8": "uchar", "int16": "short", "float32": "float"}[image["values"].dtype.name]
+    vectors = " ".join("(%g,%g,%g)" % tuple(row) for row in np.diag(image["step"]))
+    with open(name, "wb") as file:
+        file.write((f"NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\nsizes: "
+                    f"{' '.join(map(str, image['values'].shape[::-1]))}\nspace directions: {vectors}\nspace origin: "
+                    f"({','.join(map(str, image['origin']))})\nencoding: raw\nendian: little\n\n").encode())
+        file.write(np.ascontiguousarray(image["values"]).tobytes())
+
+
+def voxels_of(grid):
+    """Return labels 1 (left) and 2 (right) of the voxels of a basis's grid, [z, y, x], their spacing and origin, mm."""
+    depth = np.asarray(grid.tensor("depth")).ravel()
+    frame, size = np.asarray(grid.tensor("grid"), float), np.asarray(grid.tensor("grid_size"), int)
+    place = np.rint((grid.vertices - frame[0]) @ np.linalg.inv(frame[1:])).astype(int).T[::-1]
+    labels = np.zeros(tuple(size)[::-1], np.uint8)
+    labels[tuple(place)] = np.where(depth > 0, 1 + np.asarray(grid.tensor("lung")).ravel(), 0)
+    return {"values": labels, "step": np.diag(frame[1:]).copy(), "origin": frame[0].copy()}

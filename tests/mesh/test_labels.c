@@ -388,8 +388,8 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
   assert_int_equal(supine_image_write(path, &map, NULL, NULL), SUPINE_OK);
   assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                    SUPINE_ERROR_MESH);
-  assert_int_equal(error.remedy, SUPINE_REMEDY_LABELS_OR_AXES);
-  assert_string_equal(error.value, "RPS");
+  assert_int_equal(error.remedies[1].kind, SUPINE_REMEDY_NONE);
+  assert_string_equal(error.remedies[0].value, "RPS");
   /* So is one that mirrors front and back, or head and feet, unless the user states its axes. */
   for (int a = 1; a < 3; ++a) {
     supine_labels_options stated = {.labels = "lungmask", .axes = SUPINE_AXES_LPS};
@@ -399,8 +399,8 @@ TEST(test_labels_flipped_header_axes_found_by_anatomy) {
     assert_int_equal(supine_labels_surfaces(&path, 1, &named, out.surface, &out.report, &error),
                      SUPINE_ERROR_MESH);
     assert_says(error.message, "mirrored (labels 2 left; 1 right");
-    assert_int_equal(error.remedy, SUPINE_REMEDY_LABELS_AXES_OR_KEEP);
-    assert_string_equal(error.value, a == 1 ? "LAS" : "LPI");
+    assert_string_equal(error.remedies[1].when, "if the header is correct");
+    assert_string_equal(error.remedies[0].value, a == 1 ? "LAS" : "LPI");
     made accepted = surfaces_of(&path, 1, &stated);
     release(&accepted);
     stated = (supine_labels_options){.labels = NULL}; /* sides by position: nothing is named */

@@ -135,10 +135,12 @@ TEST(test_lungs_gate_pitched_scan_warned_of) {
   supine_mesh_free(&mesh);
 }
 
-/* Return whether one of the findings has a remedy with a value. */
-static bool advises(const supine_findings *findings, supine_remedy remedy, const char *value) {
+/* Return whether one of the findings advises to give these axes. */
+static bool advises_axes(const supine_findings *findings, const char *value) {
   for (size_t i = 0; i < findings->count; ++i) {
-    if (findings->list[i].remedy == remedy && strcmp(findings->list[i].value, value) == 0) {
+    if (findings->list[i].remedies[0].kind == SUPINE_REMEDY_GIVE &&
+        strcmp(findings->list[i].remedies[0].argument, "axes") == 0 &&
+        strcmp(findings->list[i].remedies[0].value, value) == 0) {
       return true;
     }
   }
@@ -155,7 +157,7 @@ TEST(test_gate_any_wrong_axes_proposes_correct_ones) {
     supine_mesh_axes_letters((supine_axes)code, wanted);
     outcome out = pass(&mesh, NULL);
     assert_int_equal(out.status, SUPINE_OK);
-    assert_true(advises(&out.findings, SUPINE_REMEDY_AXES_IF_RIGHT, wanted));
+    assert_true(advises_axes(&out.findings, wanted));
     assert_says(findings_text(&out.findings), "the axes are doubtful");
     assert_false(out.hold);
     supine_lungs_free(&out.lungs);
@@ -169,7 +171,7 @@ TEST(test_gate_wrong_axes_option_proposes_correct_one) {
   const supine_lungs_source ras = {.name = "x", .axes = SUPINE_AXES_RAS};
   misread(&mesh, SUPINE_AXES_RAS); /* as if --axes RAS were given for an LPS file */
   outcome out = pass(&mesh, &ras);
-  assert_true(advises(&out.findings, SUPINE_REMEDY_AXES_IF_RIGHT, "LPS"));
+  assert_true(advises_axes(&out.findings, "LPS"));
   supine_lungs_free(&out.lungs);
   supine_mesh_free(&mesh);
 }
@@ -327,14 +329,21 @@ TEST(test_gate_impossible_size_refused_unless_units_given) {
   outcome out = pass(&mesh, NULL);
   assert_int_equal(out.status, SUPINE_ERROR_MESH);
   assert_says(out.error.message, "impossible");
-  assert_int_equal(out.error.remedy, SUPINE_REMEDY_UNIT_OR_ACCEPT);
-  assert_string_equal(out.error.value, "m");
+  assert_string_equal(out.error.remedies[0].argument, "units");
+  assert_string_equal(out.error.remedies[0].value, "m");
+  assert_int_equal(out.error.remedies[1].kind, SUPINE_REMEDY_NONE);
   const supine_lungs_source given = {
       .name = "small.ply", .axes = SUPINE_AXES_LPS, .units_given = true};
   out = pass(&mesh, &given);
   assert_int_equal(out.status, SUPINE_OK);
   assert_says(findings_text(&out.findings), "warning: small.ply: the lungs are 0.");
   supine_lungs_free(&out.lungs);
+  for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
+    mesh.vertices[i] *= 50; /* a mouse's lungs */
+  }
+  out = pass(&mesh, NULL);
+  assert_int_equal(out.status, SUPINE_ERROR_MESH);
+  assert_string_equal(out.error.remedies[1].value, "mm");
   supine_mesh_free(&mesh);
 }
 

@@ -175,7 +175,7 @@ TEST(test_projection_impossible_softening_refused) {
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),
                    SUPINE_ERROR_ARGUMENT);
   supine_projection_free(&made);
-  assert_int_equal(error.remedy, SUPINE_REMEDY_REACH);
+  assert_string_equal(error.remedies[0].argument, "reach");
   model = supine_physics_model(SUPINE_LAW_DEEP);
   model.force.soften = 18.0;
   assert_int_equal(supine_projection_create(&lungs, &model, 5, &made, &error),

@@ -179,7 +179,7 @@ TEST(test_resting_volumes_become_shares) {
   assert_int_equal(supine_physics_resting_set(&resting, "supine", "5700mL", &error), SUPINE_OK);
   assert_int_equal(supine_physics_resting_settle(&resting, 2, side, full, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_OR_REST_GIVE);
+  assert_string_equal(error.remedies[1].argument, "resting");
 }
 
 TEST(test_scan_parse_states_accepted_or_refused) {
@@ -363,15 +363,15 @@ TEST(test_doubt_implausible_volume_has_remedy) {
     double full;        /* volume of each lung at full inflation, mL */
     double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
     const char *doubts; /* part of the expected warning; NULL if none is expected */
-    supine_remedy remedy;
-  } known[] = {{"full", 3000.0, 0.0, NULL, SUPINE_REMEDY_NONE},
-               {"full", 1700.0, 0.0, "not at full inflation", SUPINE_REMEDY_SCAN_NOT_FULL},
-               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL", SUPINE_REMEDY_SCAN_NOT_FULL},
-               {"supine:rest", 5100.0, 0.0, "hold 10200 mL", SUPINE_REMEDY_SCAN_OVER_REST},
-               {"supine:rest", 3000.0, 2400.0, "say 2400 mL", SUPINE_REMEDY_SCAN_OR_REST},
-               {"supine:rest", 3000.0, 2600.0, NULL, SUPINE_REMEDY_NONE},
-               {"supine:rest+300", 3000.0, 2300.0, NULL, SUPINE_REMEDY_NONE},
-               {"prone:rest", 3000.0, 2000.0, NULL, SUPINE_REMEDY_NONE}};
+    const char *advice; /* value of the first remedy, or "" */
+  } known[] = {{"full", 3000.0, 0.0, NULL, ""},
+               {"full", 1700.0, 0.0, "not at full inflation", "supine:rest"},
+               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL", "supine:rest"},
+               {"supine:rest", 5100.0, 0.0, "hold 10200 mL", "supine:rest+1000"},
+               {"supine:rest", 3000.0, 2400.0, "say 2400 mL", ""},
+               {"supine:rest", 3000.0, 2600.0, NULL, ""},
+               {"supine:rest+300", 3000.0, 2300.0, NULL, ""},
+               {"prone:rest", 3000.0, 2000.0, NULL, ""}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     const supine_person person = {0};
     const double full = known[i].full;
@@ -388,7 +388,7 @@ TEST(test_doubt_implausible_volume_has_remedy) {
     resting.ml[2] = known[i].rest;
     supine_physics_reference_doubt(&reference, &person, &resting, &findings);
     const char *text = findings_text(&findings);
-    assert_int_equal(findings.list[0].remedy, known[i].remedy);
+    assert_string_equal(findings.list[0].remedies[0].value, known[i].advice);
     if (known[i].doubts == NULL ? text[0] != '\0' : strstr(text, known[i].doubts) == NULL) {
       fail_msg("%s of %g mL: '%s'", known[i].scanned, full, text);
     }
@@ -540,7 +540,7 @@ TEST(test_reference_impossible_states_refused) {
     assert_int_equal(supine_physics_reference_find(&lungs, &model, &scan, &resting, &found, &error),
                      SUPINE_ERROR_ARGUMENT);
     assert_says(error.message, bad[i].said);
-    assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_STATE);
+    assert_string_equal(error.remedies[0].argument, "scanned");
     assert_false(found.known);
   }
   /* A model whose surface folds on the way to full inflation. */
@@ -556,7 +556,7 @@ TEST(test_reference_impossible_states_refused) {
   assert_int_equal(supine_physics_reference_find(&lungs, &rough, &scan, &resting, &found, &error),
                    SUPINE_ERROR_NUMERICAL);
   printf("%s\n", error.message);
-  assert_int_equal(error.remedy, SUPINE_REMEDY_SCAN_FULLER);
+  assert_string_equal(error.remedies[2].value, "none");
   assert_false(found.known);
   free(stiffness);
   supine_lungs_free(&lungs);

@@ -121,7 +121,7 @@ TEST(test_deform_volume_reached) {
          "breathe lungs.safetensors --posture prone --tidal 4900mL --fps 2 -o b.vtp");
   EXPECT(5, "outside the 10 to 120 %",
          "solve lungs.ply --posture left --volume scan-5700 -o b.ply");
-  EXPECT(5, "choose a volume nearer to rest, or accept this with --allow-folds",
+  EXPECT(5, "choose a volume nearer to rest; give --allow-folds to compute",
          "solve lungs.ply --posture left --volume full+1300 -o b.ply");
   EXPECT(0, "nodes", "embed lungs.safetensors --grid 12 -o grid.safetensors");
   EXPECT(5, "left lung: the surface folds",

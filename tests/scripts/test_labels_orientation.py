@@ -84,11 +84,11 @@ def check_header(labels, affine, flips, folder):
                              "-o", os.path.join(folder, "header.safetensors")],
                             capture_output=True, text=True, check=False)
     said = result.stdout + result.stderr
-    wanted = "add --axes " + "".join(pair[flip] for pair, flip in zip(("RL", "AP", "SI"), flips))
+    wanted = "give --axes " + "".join(pair[flip] for pair, flip in zip(("RL", "AP", "SI"), flips))
     if any(flips):
         bad = wanted not in said or "axes hold" in said
     else:
-        bad = "add --axes" in said or result.returncode != 0
+        bad = "give --axes" in said or result.returncode != 0
     if bad:
         faults += 1
         print(f"{flips}, exit code {result.returncode}, wanted '{wanted}':\n{said}")

@@ -289,8 +289,8 @@ refused 1 'nothing to fit to' fit rest.ply
 refused 1 'more than two scans' fit rest.ply rest.ply rest.ply
 refused 1 'name the surface of the first scan' fit --landmarks full.csv --state prone:rest:half.ply
 refused 1 'rest+500' fit --landmarks full.csv --other supine:500
-refused 2 'exchange --rest and --other' fit s_supine_full.ply s_supine_rest.ply --other supine:full
-refused 2 'exchange --rest and --other' fit --landmarks empty.csv --other supine:full
+refused 2 'exchange the states' fit s_supine_full.ply s_supine_rest.ply --other supine:full
+refused 2 'exchange the states' fit --landmarks empty.csv --other supine:full
 refused 2 'the two surfaces are the same' fit rest.ply rest.ply
 for beside in '--law deep' '--base 1' '--gain 0.3' '--box-force 0,0,0' '--constants 1,1,1,1,1,1' \
   '--reach 10'; do

@@ -107,8 +107,8 @@ moved far 'z += 400'
 refused 2 'overlap too little along z' rest.obj far.obj
 refused 2 'overlap too little along x' rest.obj other.obj
 moved cm 'x /= 10; y /= 10; z /= 10'
-refused 2 'add --units mm' rest.obj cm.obj
-refused 2 'add --units mm' cm.obj rest.obj
+refused 2 'give --units mm' rest.obj cm.obj
+refused 2 'give --units mm' cm.obj rest.obj
 moved turned 'x = -x; y = -y'
 refused 2 'overlap too little along' rest.obj turned.obj
 moved left 'x = -x'

@@ -22,10 +22,9 @@ enum { SUPINE_FINDINGS_MAX = 32, SUPINE_FINDING_TEXT_MAX = 640 };
 
 /** Something found in an input. */
 typedef struct supine_finding {
-  bool is_warning;                     /**< otherwise a note */
-  char text[SUPINE_FINDING_TEXT_MAX];  /**< one line, NUL-terminated, without "warning:" */
-  supine_remedy remedy;                /**< what can be done about it */
-  char value[SUPINE_REMEDY_VALUE_MAX]; /**< as in supine_error */
+  bool is_warning;                             /**< otherwise a note */
+  char text[SUPINE_FINDING_TEXT_MAX];          /**< one line, NUL-terminated, without "warning:" */
+  supine_remedy remedies[SUPINE_REMEDIES_MAX]; /**< as in supine_error */
 } supine_finding;
 
 /** A list of findings. Zero-initialise `count` and `dropped`. */
@@ -44,10 +43,9 @@ SUPINE_API void supine_findings_warn(supine_findings *findings, const char *form
 SUPINE_API void supine_findings_note(supine_findings *findings, const char *format, ...)
     SUPINE_PRINTF(2, 3);
 
-/** Add a remedy to the finding that was added last, unless the list is NULL.
- * @param value  value of the argument; "" or NULL for none */
-SUPINE_API void supine_findings_advise(supine_findings *findings, supine_remedy remedy,
-                                       const char *value);
+/** Set the remedies of the finding that was added last, unless the list is NULL. */
+SUPINE_API void supine_findings_advise(supine_findings *findings,
+                                       const supine_remedy remedies[SUPINE_REMEDIES_MAX]);
 
 #ifdef __cplusplus
 }

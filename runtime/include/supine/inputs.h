@@ -116,7 +116,6 @@ typedef struct supine_input {
   const char *evidence; /**< where the limits come from */
   int people;           /**< number of people that were measured; 0 if none was measured */
   int n;                /**< number of measurements */
-  const char *remedy;   /**< what to do */
   unsigned interfaces;  /**< sum of SUPINE_INPUT_BY_... */
 } supine_input;
 

@@ -9,7 +9,6 @@ from ctypes import (POINTER, c_bool, c_char, c_char_p, c_double, c_float, c_int,
                     c_void_p)
 from typing import Any, Optional
 
-from . import _remedies
 
 MODES_MAX, LUNGS_MAX, FACTS_MAX = 256, 16, 32
 
@@ -76,9 +75,14 @@ for _kind in _ERRORS:
     _kind.__module__ = "supine"  # the package that users import
 
 
+class Remedy(ctypes.Structure):
+    """The C struct supine_remedy."""
+    _fields_ = [("kind", c_int), ("argument", c_char_p), ("value", c_char * 32), ("when", c_char_p)]
+
+
 class CError(ctypes.Structure):
     """The C struct supine_error."""
-    _fields_ = [("status", c_int), ("message", c_char * 512), ("remedy", c_int), ("value", c_char * 32)]
+    _fields_ = [("status", c_int), ("message", c_char * 512), ("remedies", Remedy * 3)]
 
 
 class Volume(ctypes.Structure):
@@ -266,7 +270,7 @@ class Report(ctypes.Structure):
 
 class Finding(ctypes.Structure):
     """The C struct supine_finding."""
-    _fields_ = [("is_warning", c_bool), ("text", c_char * 640), ("remedy", c_int), ("value", c_char * 32)]
+    _fields_ = [("is_warning", c_bool), ("text", c_char * 640), ("remedies", Remedy * 3)]
 
 
 class Findings(ctypes.Structure):
@@ -324,12 +328,13 @@ def fail(status: int, message: bytes = b"", error: Optional[CError] = None) -> N
     """Raise the exception for a status. If the message is that of an error, add what to do about it."""
     text = (message or status_string(status)).decode(errors="replace")
     if error is not None and message:
-        text += _remedies.words(error.remedy, string(error.value))
+        text = explain(message, error.remedies)
     raise _ERRORS[status if 0 < status < len(_ERRORS) else 0](text)
 
 
 version = _declare("version", c_char_p)
 status_string = _declare("status_string", c_char_p, c_int)
+remedies_add = _declare("remedies_add", None, POINTER(Remedy), c_int, c_char_p, c_size_t)
 posture_count = _declare("posture_count", c_size_t)
 posture_name = _declare("posture_name", c_char_p, c_size_t)
 posture_quaternion = _declare("posture_quaternion", c_int, c_double * 4, c_double * 3)
@@ -392,6 +397,13 @@ def names_of(option: str) -> list[str]:
     while names[len(found)] is not None:
         found.append(string(names[len(found)]))
     return found
+
+
+def explain(message: bytes, remedies: Any) -> str:
+    """Return the message of an error or a finding, and what to do in the words of the package."""
+    text = ctypes.create_string_buffer(message, 1024)
+    remedies_add(remedies, 1, text, len(text))
+    return string(text.value)
 
 
 def offline() -> Optional[ctypes.CDLL]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _library as _c
-from . import _options, _remedies
+from . import _options
 
 Progress = Callable[[float], Any]
 _EXITS: dict[int, type[_c.Error]] = {1: _c.ArgumentError, 2: _c.FormatError, 3: _c.UnsupportedError,
@@ -177,8 +177,7 @@ def fail(command: str, status: int, said: str) -> None:
 
 def told(findings: _c.Findings) -> list[str]:
     """Return the warnings among the findings of the C libraries, each with what to do."""
-    return [_c.string(each.text) + _remedies.words(each.remedy, _c.string(each.value))
-            for each in findings.list[:findings.count] if each.is_warning]
+    return [_c.explain(each.text, each.remedies) for each in findings.list[:findings.count] if each.is_warning]
 
 
 def warn(messages: Sequence[str]) -> None:
