@@ -417,6 +417,13 @@ static void print_clusters(const entry *entries, size_t count, size_t modes) {
                best->seconds / own, find(entries, count, "plain_clusters", "float32", 1) / own);
 }
 
+/* Print how much faster something is, unless one of the two was not measured. */
+static void print_times(const char *what, double times) {
+  if (isfinite(times)) {
+    (void)printf("%s: %.2f times as fast\n", what, times);
+  }
+}
+
 static void print(const entry *entries, size_t count, size_t vertices) {
   (void)printf("%-15s %-10s %7s %9s %6s %8s\n", "what", "how", "threads", "ns/vertex", "bytes",
                "GB/s");
@@ -428,20 +435,18 @@ static void print(const entry *entries, size_t count, size_t vertices) {
   }
   const double own = find(entries, count, "supine", "int16", 1);
   const double exact32 = find(entries, count, "supine", "exact", 1);
-  (void)printf(
-      "supine int16, 1 thread, compared with:\n"
-      "  sgemv_displace float32: %.2f times as fast\n  sgemv_columns float32: %.2f times as fast\n"
-      "  plain_native float32: %.2f times as fast\n  planar int16: %.2f times as fast\n"
-      "supine exact compared with planar float32: %.2f times as fast\n"
-      "supine int16, 1 thread, compared with traffic int16: %.2f times as fast\n"
-      "supine int16, 2 threads compared with 1 thread: %.2f times as fast\n",
-      find(entries, count, "sgemv_displace", "float32", 1) / own,
-      find(entries, count, "sgemv_columns", "float32", 1) / own,
-      find(entries, count, "plain_native", "float32", 1) / own,
-      find(entries, count, "planar", "int16", 1) / own,
-      find(entries, count, "planar", "float32", 1) / exact32,
-      find(entries, count, "traffic", "int16", 1) / own,
-      own / find(entries, count, "supine", "int16", 2));
+  (void)printf("supine int16, 1 thread, compared with:\n");
+  print_times("  sgemv_displace float32",
+              find(entries, count, "sgemv_displace", "float32", 1) / own);
+  print_times("  sgemv_columns float32", find(entries, count, "sgemv_columns", "float32", 1) / own);
+  print_times("  plain_native float32", find(entries, count, "plain_native", "float32", 1) / own);
+  print_times("  planar int16", find(entries, count, "planar", "int16", 1) / own);
+  print_times("supine exact compared with planar float32",
+              find(entries, count, "planar", "float32", 1) / exact32);
+  print_times("supine int16, 1 thread, compared with traffic int16",
+              find(entries, count, "traffic", "int16", 1) / own);
+  print_times("supine int16, 2 threads compared with 1 thread",
+              own / find(entries, count, "supine", "int16", 2));
   const double exact = find(entries, count, "exact_normals", "float32", 1);
   if (isfinite(exact)) {
     (void)printf(
