@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run each command that README.md and tests/FIGURES.md quote, and check that each quoted program exists. README may
-have up to 1,300 words.
+"""Run each command that README.md, docs/paper.md and tests/FIGURES.md quote, and check that each quoted program exists.
+README may have up to 1,300 words.
 
     test_quoted.py SUPINE SOURCE BUILD
 """
@@ -124,6 +124,27 @@ def check_readme():
     os.chdir("..")
 
 
+def check_paper():
+    """Run the commands of docs/paper.md in their order: those of its block, then those of its table's second column."""
+    with open(os.path.join(source, "docs/paper.md"), encoding="utf-8") as file:
+        text = file.read()
+    column = [row.split("|")[2] for row in text.split("\n") if row.startswith("| ")]
+    quoted = [code for cell in column for code in re.findall(r"`(supine [^`]+)`", cell)]
+    lines = re.search(r"^```sh\n(.*?)^```$", text, re.M | re.S)[1].splitlines()
+    lines += [code for code in dict.fromkeys(quoted) if code.split()[1] not in SERVERS]
+    if len(lines) < 15:
+        failures.append(f"docs/paper.md quotes {len(lines)} commands only")
+    os.mkdir("paper")
+    os.mkdir("bin")
+    os.symlink(supine, "bin/supine")
+    path = f"{os.getcwd()}/bin:{os.environ['PATH']}"
+    for line in lines:
+        done = subprocess.run(["sh", "-ec", line], cwd="paper", env={**os.environ, "PATH": path}, capture_output=True,
+                              text=True, check=False)
+        if done.returncode != 0:
+            failures.append(f"docs/paper.md: {line}: {done.stderr}")
+
+
 commands = []
 for page in ("README.md", "tests/FIGURES.md"):
     with open(os.path.join(source, page), encoding="utf-8") as text:
@@ -134,6 +155,7 @@ with tempfile.TemporaryDirectory() as folder:
     for command in dict.fromkeys(commands):
         check(command)
     check_readme()
+    check_paper()
     os.chdir(source)
 print("\n".join(failures) if failures else f"{len(set(commands))} quoted words and commands checked")
 sys.exit(1 if failures else 0)
