@@ -84,6 +84,13 @@ static const supine_input inputs[] = {
     .against = TEXT("the surface of the lungs"), .measured = TEXT("distance outside, mm"),
     .told = NAN, .refused = 60, .evidence = TEXT("assumed: beyond ribs and chest wall"),
     .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},
+  [SUPINE_INPUT_CONTENT_OUTSIDE] = {
+    .name = "content-outside", .group = TEXT("Points"), .input = TEXT("points, or a mesh or label that moves with the lungs"),
+    .against = TEXT("the surface of the lungs"), .measured = TEXT("share of the vertices more than 5 mm and an edge outside, and not between the lungs"),
+    .told = 0.02, .refused = NAN,
+    .evidence = TEXT("tests/evidence/belongs.py: own lungs and lobes, surfaces of 6 and 12 mm edge, at most 0.008; another person's lungs 0.03 to 0.40, lobes up to 0.78"),
+    .people = 7, .n = 84,
+    .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},
   [SUPINE_INPUT_DEVICE_NAME] = {
     .name = "device-name", .group = TEXT("Points"), .input = TEXT("the name of a tracker's device"),
     .against = TEXT("OpenIGTLink"), .measured = TEXT("characters"), .told = NAN, .refused = 20,
@@ -164,6 +171,12 @@ static const supine_input inputs[] = {
     .told = NAN, .refused = 0.1, .evidence = TEXT("lungs: 0.61 to 0.77; a shell of 3 mm: 0.07"),
     .people = 10, .n = 38,
     .interfaces = OFFLINE},
+  [SUPINE_INPUT_LUNGS_LEVEL] = {
+    .name = "lungs-level", .group = TEXT("Label maps"), .input = TEXT("a left and a right lung, also of meshes"),
+    .against = TEXT("each other"), .measured = TEXT("distance of their backs / depth of the deeper lung"),
+    .told = 0.1, .refused = NAN, .evidence = TEXT("own lungs: at most 0.05; lungs of two people 0.14 to 0.38"),
+    .people = 10, .n = 20,
+    .interfaces = OFFLINE},
   [SUPINE_INPUT_VOXELS_BEGIN] = {
     .name = "voxels-begin", .group = TEXT("Label maps"), .input = TEXT("vox_offset of a NIfTI header"),
     .against = TEXT("the least that the format allows"), .measured = TEXT("offset / least offset"), .below = true,
@@ -181,8 +194,15 @@ static const supine_input inputs[] = {
     .interfaces = COMMAND},
   [SUPINE_INPUT_CT_AIR] = {
     .name = "ct-air", .group = TEXT("Images"), .input = TEXT("a CT"),
-    .against = TEXT("air inside the lungs of the basis"), .measured = TEXT("median inside the lungs, HU"),
-    .told = NAN, .refused = -300, .evidence = TEXT("assumed: collapsed and consolidated tissue is above"),
+    .against = TEXT("air inside the lungs of the basis"), .measured = TEXT("share of the lungs without air, above -300 HU"),
+    .told = 0.2, .refused = 0.5, .evidence = TEXT("tests/evidence/belongs.py, CTs made from label maps: own 0.00, of another person 0.2 to 0.6, own 30 mm off 0.2 to 0.3; refused: assumed, as half of the lungs may be consolidated"),
+    .people = 5, .n = 30,
+    .interfaces = COMMAND},
+  [SUPINE_INPUT_CT_SOFT] = {
+    .name = "ct-soft", .group = TEXT("Images"), .input = TEXT("a CT"),
+    .against = TEXT("soft tissue that lungs hold"), .measured = TEXT("soft tissue / volume of a lung"),
+    .told = 0.05, .refused = NAN, .evidence = TEXT("tests/evidence/belongs.py"),
+    .people = 5, .n = 30,
     .interfaces = COMMAND},
   [SUPINE_INPUT_ONE_PERSON] = {
     .name = "one-person", .group = TEXT("Two scans"), .input = TEXT("two scans of one posture"),

@@ -16,6 +16,7 @@
 #include "precompute/inside/anatomy.h"
 #include "precompute/inside/biharmonic.h"
 #include "precompute/inside/embed.h"
+#include "precompute/lungs/belong.h"
 
 enum { BLOCK = 1024 };
 
@@ -99,8 +100,9 @@ static void add_name(const char *names, size_t part, char *text, size_t size) {
     }
   }
   const size_t length = strlen(text);
-  (void)snprintf(text + length, size - length, "%s'%.*s'", length > 0 ? ", " : "",
-                 (int)strcspn(names, "\n"), names);
+  (void)snprintf(text + length, size - length, "%s'%.*s'",
+                 length > 0 && text[length - 1] == '\'' ? ", " : "", (int)strcspn(names, "\n"),
+                 names);
 }
 
 /* Refuse parts whose nearest point is too far outside the lungs. */
@@ -134,6 +136,46 @@ static supine_status check_distance(const embedding *e, supine_error *error) {
       "of the lungs says nothing: leave them out, or check their axes and unit",
       far_count, parts, far, more, farthest);
   return SUPINE_OK;
+}
+
+/* Find the box of the lungs in the scan. */
+static void find_box(const supine_inside_shells *shells, double low[3], double high[3]) {
+  supine_box_begin(low, high);
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    for (size_t i = 0; i < shells->shell[lung].vertex_count; ++i) {
+      supine_box_add(shells->shell[lung].vertices + 3 * i, low, high);
+    }
+  }
+}
+
+/* Warn of parts that lie outside the lungs and not between them, as those of another person do. A
+ * coarse surface cuts corners off the lungs, by up to about its edge length. */
+static void check_belonging(const embedding *e, supine_findings *findings) {
+  const supine_inside_content *content = e->content;
+  const supine_basis_info *info = supine_basis_get_info(e->shells->basis);
+  const int single = info->lung_names[0][0] == 'l' ? 1 : -1;
+  double low[3];
+  double high[3];
+  find_box(e->shells, low, high);
+  if (e->options->clamp || content->part_count == 0) {
+    return;
+  }
+  supine_lungs_belong points = {.rim = SUPINE_LUNGS_RIM + e->shells->shell[0].edge};
+  for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
+    supine_lungs_belong part = {.rim = points.rim};
+    end = end_of_part(content, begin);
+    for (size_t i = begin; i < end; ++i) {
+      const bool between = supine_lungs_is_between(low, high, e->shells->count == 2 ? 0 : single,
+                                                   content->points + 3 * i);
+      supine_lungs_belong_add(end == begin + 1 ? &points : &part,
+                              between ? 0.0 : e->place[i].depth);
+    }
+    char text[96] = "vertices of ";
+    add_name(content->names, content->part[begin], text, sizeof text);
+    (void)supine_lungs_belong_judge(&part, SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis", findings);
+  }
+  (void)supine_lungs_belong_judge(&points, SUPINE_INPUT_CONTENT_OUTSIDE, "points", "basis",
+                                  findings);
 }
 
 /* Sort the points by lung, in stable order, and renumber the triangles. */
@@ -527,6 +569,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
   gather_parts(&e);
   SUPINE_TRY(check_distance(&e, error));
+  check_belonging(&e, &report->findings);
   SUPINE_TRY(supine_inside_anatomy(shells, content, e.anatomy, error));
   SUPINE_TRY(sort_points(&e, report, error));
   for (size_t lung = 0, begin = 0; lung < shells->count; begin += report->in_lung[lung++]) {

@@ -23,6 +23,8 @@
 #ifndef SUPINE_INSIDE_EMBED_H
 #define SUPINE_INSIDE_EMBED_H
 
+#include <supine/findings.h>
+
 #include "precompute/inside/content.h"
 #include "precompute/inside/shells.h"
 
@@ -54,6 +56,7 @@ typedef struct supine_inside_report {
   size_t farthest;    /**< index of the outside point that is farthest from the lungs */
   double farthest_mm; /**< distance of the farthest outside point from the lungs, mm */
   size_t rigid;       /**< number of rigid parts of more than one vertex */
+  supine_findings findings; /**< warnings about parts that hardly belong to these lungs */
 } supine_inside_report;
 
 /** Embed the points of `content` in the lungs, and write them as a new basis file. The file has

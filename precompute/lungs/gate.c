@@ -348,6 +348,21 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   }
 }
 
+/* Check that the backs of two lungs are level, as one person's are. Bases and apices differ more. */
+static void check_level(checks *c, const supine_lungs *lungs) {
+  const double depth[2] = {lungs->high[0][1] - lungs->low[0][1],
+                           lungs->high[1][1] - lungs->low[1][1]};
+  const double apart = fabs(lungs->high[0][1] - lungs->high[1][1]);
+  check(c,
+        lungs->lung_count < 2 ||
+            supine_input_judge(SUPINE_INPUT_LUNGS_LEVEL, apart / fmax(depth[0], depth[1])) ==
+                SUPINE_INPUT_TAKEN,
+        SUPINE_OK, SUPINE_REMEDY_NONE, NULL,
+        "the back of one lung lies %.0f mm in front of the other's: check that both lungs are of "
+        "one person, in one frame",
+        apart);
+}
+
 /* Divide the triangles between two lungs along the axis on which the two overlap least. Return the
  * number of lungs.
  * @param parts  written; the vertices are those of `lungs`, the triangles are in the arena */
@@ -434,6 +449,9 @@ static void check_shape(checks *c, const supine_lungs *lungs, int *side, bool *a
   check(c, !found.joined || c->source->midline != NULL || c->source->side != 0, SUPINE_ERROR_MESH,
         divide, "this surface looks like both lungs in one piece: separate them");
   check_size(c, lungs, likely);
+  if (found.axes == SUPINE_AXES_LPS) {
+    check_level(c, lungs);
+  }
   for (size_t lung = 0; lung < lungs->lung_count && c->status == SUPINE_OK; ++lung) {
     check_solid(c, lungs, lung);
   }

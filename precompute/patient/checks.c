@@ -7,7 +7,7 @@
 #include <gsl/gsl_statistics.h>
 #include <supine/inputs.h>
 
-#include "precompute/lungs/surface.h"
+#include "precompute/lungs/belong.h"
 #include "precompute/patient/checks.h"
 
 #include "base/arena.h"
@@ -113,24 +113,13 @@ void supine_patient_check_person(const supine_patient_size *first,
 supine_status supine_patient_check_landmarks(const char *state, const supine_mesh *lungs,
                                              size_t count, const double *points,
                                              supine_findings *findings, supine_error *error) {
-  static const double far = 5.0; /* mm; landmarks and surfaces differ by less */
   SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *tree = NULL;
-  size_t outside = 0;
-  double farthest = 0.0;
+  supine_lungs_belong found = {.rim = SUPINE_LUNGS_RIM};
   SUPINE_TRY(supine_lungs_surface_create(lungs->vertices, lungs->triangle_count, lungs->triangles,
                                          true, &tree, error));
-  for (size_t i = 0; i < count; ++i) {
-    const double depth = supine_lungs_surface_find(tree, points + 3 * i, NULL).depth;
-    outside += depth < -far;
-    farthest = fmax(farthest, -depth);
-  }
-  const double share = count > 0 ? (double)outside / (double)count : 0.0;
-  if (is_told(SUPINE_INPUT_LANDMARKS_OUTSIDE, share)) {
-    supine_findings_warn(findings,
-                         "%zu of %zu landmarks lie outside the lungs of the %s, by up to %.0f mm: "
-                         "check that they are this person's, and their axes",
-                         outside, count, state, farthest);
-  }
+  supine_lungs_belong_add_points(&found, tree, count, points);
+  (void)supine_lungs_belong_judge(&found, SUPINE_INPUT_LANDMARKS_OUTSIDE, "landmarks", state,
+                                  findings);
   return SUPINE_OK;
 }
 

@@ -183,6 +183,8 @@ supine_status supine_warp_tissue_find_air(const supine_image *ct, supine_tissue 
     const size_t lung = i % SUPINE_LUNGS_MAX;
     tissue->mass[lung] += layer->mass[lung];
     tissue->soft[lung] += layer->soft[lung] * supine_warp_tissue_voxel(ct);
+    tissue->volume[lung] +=
+        (layer->soft[lung] + layer->count[lung]) * supine_warp_tissue_voxel(ct);
     total.air[lung] += layer->air[lung];
     total.count[lung] += layer->count[lung];
   }

@@ -8,16 +8,23 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "precompute/lungs/belong.h"
 #include "precompute/warp/check_image.h"
-#include "precompute/warp/field.h"
 
 /* Nodes of the grid less deep than this are left out, mm: the lungs' rim is soft. */
 static const double rim = 3.0;
+/* Voxels of labels may lie so far outside the lungs, mm: the basis may have coarse surfaces. */
+static const double label_rim = 15.0;
+/* A label of which less than this share lies in the lungs does not belong to them. */
+static const double label_inside = 1.0 / 3.0;
+/* Collapsed and consolidated tissue, and that outside the lungs, is above this density, HU. */
+static const double airless = -300.0;
+enum { LABELS = 65536 };
 
 /* What an image shows at the nodes inside the lungs. */
 typedef struct sight {
-  size_t nodes, seen;       /* number of nodes inside the lungs, and of those in the image */
-  double *value;            /* [nodes] values of the image at the nodes seen */
+  size_t nodes;             /* number of nodes inside the lungs */
+  supine_lungs_belong lung; /* the nodes that lie in the image; outside: those without air */
   double low[3], high[3];   /* box of the nodes, mm */
   double first[3], last[3]; /* box of the image, mm */
 } sight;
@@ -54,6 +61,7 @@ static bool look(const supine_image *image, const double point[3], double *value
 static void look_at_nodes(const supine_image *depth, const supine_image *image, sight *s) {
   for (size_t i = 0; i < depth->size[0] * depth->size[1] * depth->size[2]; ++i) {
     double point[3];
+    double value;
     if (!(supine_image_get(depth, i) > rim)) {
       continue;
     }
@@ -63,22 +71,20 @@ static void look_at_nodes(const supine_image *depth, const supine_image *image, 
       s->high[k] = s->nodes == 0 ? point[k] : fmax(s->high[k], point[k]);
     }
     ++s->nodes;
-    s->seen += look(image, point, &s->value[s->seen]);
+    if (look(image, point, &value)) {
+      supine_lungs_belong_add(&s->lung, value < airless ? 1.0 : -1.0);
+    }
   }
   find_image_box(image, s);
 }
 
-static int compare(const void *a, const void *b) {
-  const double x = *(const double *)a;
-  const double y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-/* Describe what is wrong with the image; write nothing if it fits. */
-static void describe(const sight *s, bool ct, bool scaled, char *text, size_t size) {
-  const double share = (double)s->seen / (double)s->nodes;
+/* Describe what is wrong with the image; write nothing if it fits. Return the verdict. */
+static supine_input_verdict describe(const sight *s, bool ct, bool scaled, char *text,
+                                     size_t size) {
+  const double share = (double)s->lung.count / (double)s->nodes;
   const supine_input_id frame = scaled ? SUPINE_INPUT_CT_FRAME : SUPINE_INPUT_IMAGE_FRAME;
-  if (supine_input_judge(frame, share) != SUPINE_INPUT_TAKEN) {
+  supine_input_verdict verdict = supine_input_judge(frame, share);
+  if (verdict != SUPINE_INPUT_TAKEN) {
     (void)supine_print_text(
         text, size,
         "only %.0f %% of the lungs lie in the image: the lungs are at x %.0f to %.0f, y %.0f to "
@@ -86,39 +92,91 @@ static void describe(const sight *s, bool ct, bool scaled, char *text, size_t si
         "(LPS); give an image in the frame of the scan",
         100.0 * share, s->low[0], s->high[0], s->low[1], s->high[1], s->low[2], s->high[2],
         s->first[0], s->last[0], s->first[1], s->last[1], s->first[2], s->last[2]);
-    return;
+    return verdict;
   }
-  const double median = s->value[s->seen / 2];
-  if (ct && supine_input_judge(SUPINE_INPUT_CT_AIR, median) != SUPINE_INPUT_TAKEN) {
+  const double other = supine_lungs_belong_share(&s->lung);
+  verdict = ct ? supine_input_judge(SUPINE_INPUT_CT_AIR, other) : SUPINE_INPUT_TAKEN;
+  if (verdict != SUPINE_INPUT_TAKEN) {
     (void)supine_print_text(
         text, size,
-        "half of the voxels inside the lungs are above %.0f HU, so that they hold no air: check "
-        "the axes of the image, and that it shows these lungs",
-        median);
+        "%.0f %% of the lungs of the basis hold no air in the image (above %.0f HU): check that it "
+        "shows these lungs in this state, and its axes, unless so much of them is consolidated",
+        100.0 * other, airless);
   }
+  return verdict;
 }
 
-supine_status supine_warp_check_image(const supine_image *depth, const supine_image *image,
+/* Warn of labels that lie in the lungs mostly, but far outside in part, as another person's do. */
+static supine_status check_labels(const supine_field *field, const supine_image *image,
+                                  const sight *s, const char *path, supine_findings *findings,
+                                  supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  supine_lungs_belong *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
+  size_t *inside = supine_arena_zeros(&arena, LABELS, sizeof *inside);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%d labels", (int)LABELS));
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    const double label = supine_image_get(image, i);
+    double point[3];
+    double depth = 0.0;
+    supine_warp_cell cell;
+    if (!(label >= 1.0 && label < LABELS)) {
+      continue;
+    }
+    supine_image_place(image, i, point);
+    if (!supine_lungs_is_between(s->low, s->high, 0, point)) {
+      supine_warp_find_cell(&field->depth, point, &cell);
+      supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
+    }
+    found[(size_t)label].rim = label_rim;
+    supine_lungs_belong_add(&found[(size_t)label], depth);
+    inside[(size_t)label] += depth >= 0.0;
+  }
+  for (size_t label = 1; label < LABELS; ++label) {
+    char text[320];
+    (void)snprintf(text, sizeof text, "voxels of label %zu in %.256s", label, path);
+    if ((double)inside[label] > label_inside * (double)found[label].count) {
+      (void)supine_lungs_belong_judge(&found[label], SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis",
+                                      findings);
+    }
+  }
+  return SUPINE_OK;
+}
+
+supine_status supine_warp_check_image(const supine_field *field, const supine_image *image,
                                       const char *path, supine_warp_image_kind kind,
                                       supine_findings *findings, supine_error *error) {
-  SUPINE_ARENA arena = {0};
   char text[512] = "";
-  const size_t most = depth->size[0] * depth->size[1] * depth->size[2];
-  sight s = {.value = supine_arena_take(&arena, most, sizeof *s.value)};
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu nodes", most));
-  look_at_nodes(depth, image, &s);
+  sight s = {.nodes = 0};
+  look_at_nodes(&field->depth, image, &s);
   if (s.nodes == 0) {
     return SUPINE_OK;
   }
-  qsort(s.value, s.seen, sizeof *s.value, compare);
-  describe(&s,
-           kind == SUPINE_FIELD_CT ||
-               (kind == SUPINE_FIELD_IMAGE && supine_warp_is_hounsfield(image)),
-           kind == SUPINE_FIELD_CT, text, sizeof text);
-  SUPINE_REFUSE_IF(kind == SUPINE_FIELD_CT && text[0] != '\0', error, SUPINE_ERROR_FORMAT, "%s: %s",
-                   path, text);
-  if (text[0] != '\0') {
+  const bool ct = kind == SUPINE_FIELD_CT ||
+                  (kind == SUPINE_FIELD_IMAGE && supine_warp_is_hounsfield(image));
+  const supine_input_verdict verdict =
+      describe(&s, ct, kind == SUPINE_FIELD_CT, text, sizeof text);
+  SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED && kind == SUPINE_FIELD_CT, error,
+                   SUPINE_ERROR_FORMAT, "%s: %s", path, text);
+  if (verdict != SUPINE_INPUT_TAKEN) {
     supine_findings_warn(findings, "%s: %s", path, text);
+  } else if (kind == SUPINE_FIELD_LABELS) {
+    SUPINE_TRY(check_labels(field, image, &s, path, findings, error));
   }
   return SUPINE_OK;
+}
+
+void supine_warp_check_soft(const supine_tissue *tissue, const char *path,
+                            supine_findings *findings) {
+  for (size_t lung = 0; lung < tissue->lungs; ++lung) {
+    const double share = tissue->soft[lung] / tissue->volume[lung];
+    if (tissue->volume[lung] > 0.0 &&
+        supine_input_judge(SUPINE_INPUT_CT_SOFT, share) != SUPINE_INPUT_TAKEN) {
+      supine_findings_warn(
+          findings,
+          "%s: %.0f mL of soft tissue are %.0f %% of a lung of %.0f mL, where vessels and nodules "
+          "are less: check that the CT shows these lungs in this state, unless so much of them is "
+          "consolidated",
+          path, tissue->soft[lung], 100.0 * share, tissue->volume[lung]);
+    }
+  }
 }

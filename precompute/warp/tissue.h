@@ -37,6 +37,7 @@ typedef struct supine_tissue {
   size_t lungs;
   double mass[SUPINE_LUNGS_MAX]; /**< sum of HU + 1000 over the voxels of each lung */
   double soft[SUPINE_LUNGS_MAX]; /**< voxels of each lung that are not aerated, mL */
+  double volume[SUPINE_LUNGS_MAX]; /**< all voxels of each lung, mL */
   size_t part_count;
   supine_warp_part *parts;
   size_t group_count;

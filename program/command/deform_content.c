@@ -254,6 +254,9 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
     (void)printf("%s: soft tissue in the lungs: ", wanted->image);
     print_lungs(basis, soft->soft, "%.1f mL");
     (void)putchar('\n');
+    supine_findings findings = {.count = 0};
+    supine_warp_check_soft(soft, wanted->image, &findings);
+    supine_options_say_findings("deform", &findings);
   }
   SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
                                            wanted->rigid.count, soft, error));
@@ -345,7 +348,7 @@ static supine_status check_images(const supine_deform_content *wanted, const sup
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof images / sizeof *images && status == SUPINE_OK; ++i) {
     if (images[i].path != NULL) {
-      status = supine_warp_check_image(&field->depth, images[i].image, images[i].path,
+      status = supine_warp_check_image(field, images[i].image, images[i].path,
                                        images[i].kind, &findings, error);
     }
   }

@@ -143,6 +143,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
     SUPINE_TRY(supine_inside_content_make_rigid(&content, wanted->rigid, error));
   }
   SUPINE_TRY(supine_inside_embed(&shells, &content, &options, wanted->path, &report, error));
+  supine_options_say_findings(name, &report.findings);
   print_summary(&shells, &content, &report, wanted);
   return SUPINE_OK;
 }

@@ -34,6 +34,7 @@ typedef enum supine_input_id {
   SUPINE_INPUT_STATE_MEMBERS,
   /* Points, and what is tracked. */
   SUPINE_INPUT_POINT_OUTSIDE,
+  SUPINE_INPUT_CONTENT_OUTSIDE,
   SUPINE_INPUT_DEVICE_NAME,
   SUPINE_INPUT_TRACKER_INVALID,
   /* The patient. */
@@ -51,11 +52,13 @@ typedef enum supine_input_id {
   SUPINE_INPUT_LABELS_ORDER,
   SUPINE_INPUT_LUNG_PIECES,
   SUPINE_INPUT_LUNG_HOLLOW,
+  SUPINE_INPUT_LUNGS_LEVEL,
   SUPINE_INPUT_VOXELS_BEGIN,
   /* Images that move with the lungs. */
   SUPINE_INPUT_IMAGE_FRAME,
   SUPINE_INPUT_CT_FRAME,
   SUPINE_INPUT_CT_AIR,
+  SUPINE_INPUT_CT_SOFT,
   /* Two scans of one person, in one posture. */
   SUPINE_INPUT_ONE_PERSON,
   SUPINE_INPUT_REST_LEAST,
