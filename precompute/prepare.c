@@ -126,7 +126,8 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
   tell_volume(record, &p->source.findings);
   tell_size(fitted, record->shown, &p->source.lungs, &p->source.findings);
-  return SUPINE_OK;
+  return supine_patient_check_law(fitted, record->shown, &p->source.lungs.mesh,
+                                  &p->source.findings, error);
 }
 
 /* Say that the state of the scan is taken from the fit. Refuse a scan whose state the fit does not

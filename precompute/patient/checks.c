@@ -18,6 +18,8 @@
 
 enum { GROUPS = 20, NEIGHBOURS = 8, PAIRS_LEAST = 30, NAMED_MOST = 12 };
 
+/* A coarse surface cuts corners off the lungs, up to about this share of its edge length. */
+static const double cut = 0.8;
 static const double growth_least = 0.02; /* smaller changes of ln(volume) are none */
 static const double dropped_most = 0.2;  /* largest share of the pairs that are dropped */
 /* A pair that differs by less from its neighbours is not dropped, mm. */
@@ -110,17 +112,48 @@ void supine_patient_check_person(const supine_patient_size *first,
       100.0 * (is_share ? share + worst.expected : exp(worst.expected)));
 }
 
+/* Return the mean length of the edges of a surface, mm. */
+static double mean_edge(const supine_mesh *mesh) {
+  double sum = 0.0;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    const size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    sum += supine_distance(mesh->vertices + 3 * (size_t)mesh->triangles[i],
+                           mesh->vertices + 3 * (size_t)mesh->triangles[next]);
+  }
+  return sum / (double)(3 * mesh->triangle_count);
+}
+
 supine_status supine_patient_check_landmarks(const char *state, const supine_mesh *lungs,
                                              size_t count, const double *points,
                                              supine_findings *findings, supine_error *error) {
   SUPINE_FREED_BY(supine_lungs_surface_drop) supine_lungs_surface *tree = NULL;
-  supine_lungs_belong found = {.rim = SUPINE_LUNGS_RIM};
+  supine_lungs_belong found = {.rim = fmax(SUPINE_LUNGS_RIM, cut * mean_edge(lungs))};
   SUPINE_TRY(supine_lungs_surface_create(lungs->vertices, lungs->triangle_count, lungs->triangles,
                                          true, &tree, error));
   supine_lungs_belong_add_points(&found, tree, count, points);
   (void)supine_lungs_belong_judge(&found, SUPINE_INPUT_LANDMARKS_OUTSIDE, "landmarks", state,
                                   findings);
   return SUPINE_OK;
+}
+
+supine_status supine_patient_check_law(const supine_patient_record *fitted, size_t state,
+                                       const supine_mesh *lungs, supine_findings *findings,
+                                       supine_error *error) {
+  const supine_patient *patient = &fitted->patient;
+  const supine_patient_frame *frame = &patient->frame;
+  SUPINE_ARENA arena = {0};
+  double *points = supine_arena_take(&arena, patient->centre_count + 1, 3 * sizeof *points);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", patient->centre_count));
+  if (fitted->from_surface || state != 0 || patient->centre_count == 0) {
+    return SUPINE_OK;
+  }
+  for (size_t i = 0; i < 3 * patient->centre_count; ++i) {
+    const size_t k = i % 3;
+    points[i] =
+        patient->centre[i / 3].offset[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
+  }
+  return supine_patient_check_landmarks("scan", lungs, patient->centre_count, points, findings,
+                                        error);
 }
 
 /* Return the logarithm of the growth without the pairs of a group (GROUPS: of all pairs).

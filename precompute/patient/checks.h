@@ -8,6 +8,7 @@
 
 #include "precompute/lungs/lungs.h"
 #include "precompute/patient/pairs.h"
+#include "precompute/patient/patient_file.h"
 
 /** Measures of lungs by which the scans of two people can often be told apart: of the left, then the
  * right lung; 0 of a lung that is absent. */
@@ -37,6 +38,13 @@ void supine_patient_check_person(const supine_patient_size *first,
 supine_status supine_patient_check_landmarks(const char *state, const supine_mesh *lungs,
                                              size_t count, const double *points,
                                              supine_findings *findings, supine_error *error);
+
+/** Warn if the landmarks of a law that was fitted to landmarks alone lie outside the lungs on which it
+ * is put. Nothing is told of a scan of the emptier state, in which their positions are not known.
+ * @param state  which state the lungs show: 0 the fuller, 1 the emptier */
+supine_status supine_patient_check_law(const supine_patient_record *fitted, size_t state,
+                                       const supine_mesh *lungs, supine_findings *findings,
+                                       supine_error *error);
 
 /** Return the standard error of the logarithm of supine_patient_pairs_growth, by leaving out each
  * of 20 groups of pairs. */
