@@ -172,6 +172,13 @@ def imaged(voxels, *words, shift=0.0):
     return {"command": run}
 
 
+def speckled(voxels):
+    """Replace every twelfth voxel of the lungs by soft tissue."""
+    voxels = voxels.copy()
+    voxels.ravel()[np.flatnonzero(voxels < -500)[::12]] = 40
+    return voxels
+
+
 def scanned(scale, left=1.0):
     """Validate a basis by a scan at rest that is scaled, its left lung along z."""
     def run():
@@ -241,6 +248,7 @@ CASES = {
     "state-members": (members({"gravity": [0, -1, 0], "volume": "rest"}),
                       members({"posture": "prone", "volume": "rest"}), "refused"),
     "point-outside": (embedded(-100), embedded(900), "refused"),
+    "content-outside": (lambda: embedded(-100), lambda: embedded(solid[:, 2].max() + 20), "told"),
     "device-name": (tracked("OK"), tracked("OK", "a_name_of_21_letters_"), "refused"),
     "tracker-invalid": (tracked("OK"), tracked("INVALID"), "told"),
     "height-least": (made("lungs.ply", height=160, sex="female"), made("lungs.ply", height=135, sex="female"), "told"),
@@ -262,10 +270,12 @@ CASES = {
     "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"),
                     "told"),
     "lung-hollow": (lambda: made("lungs.ply"), lambda: made("hollow.ply"), "refused"),
+    "lungs-level": (lambda: made("lungs.ply"), lambda: made("apart.ply"), "told"),
     "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
     "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
     "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
     "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),
+    "ct-soft": (lambda: imaged(ct, "--density"), lambda: imaged(speckled(ct), "--density"), "told"),
     "one-person": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
     "rest-least": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest+1500"), "told"),
     "rest-most": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest-2500"), "told"),
@@ -433,6 +443,7 @@ write_ply("high.ply", (solid - solid.mean(axis=0)) * [1, 1, 1.08] + solid.mean(a
 write_ply("full.ply", (solid - solid.mean(axis=0)) * 1.04 + solid.mean(axis=0), corners)
 first_lung = np.asarray(lungs.tensor("lung")).ravel()
 middles = np.array([solid[first_lung == j].mean(axis=0) for j in (0, 1)])[first_lung]
+write_ply("apart.ply", solid + np.where(first_lung == 0, 0, 60)[:, None] * [0, 1, 0], corners)
 write_ply("hollow.ply", np.concatenate([solid, middles + 0.97 * (solid - middles)]),
           np.concatenate([corners, corners[:, ::-1] + len(solid)]))
 write_ply("rest.ply", lungs.deform(lungs.pose("supine:rest")).astype(float), corners)
