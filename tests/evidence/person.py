@@ -28,14 +28,14 @@ FLOOR, SPREAD, LEAST, LIMIT = np.array([0.015] * 6 + [0.010]), 0.05, 0.02, 3.5
 
 
 def tensors(path):
-    """Read the vertices, triangles, lungs and depths of a basis."""
+    """Read the vertices, triangles, lungs, depths and parts of a basis."""
     with open(path, "rb") as file:
         data = file.read()
     size = struct.unpack("<Q", data[:8])[0]
     header = json.loads(data[8:8 + size])
     kinds = {"F32": "<f4", "U32": "<u4", "U8": "u1"}
     found = {}
-    for name in ("vertices", "triangles", "depth", "lung"):
+    for name in ("vertices", "triangles", "depth", "lung", "part"):
         if name in header:
             kind, shape, at = (header[name][key] for key in ("dtype", "shape", "data_offsets"))
             found[name] = np.frombuffer(data, kinds[kind], int(np.prod(shape)), 8 + size + at[0]).reshape(shape)
