@@ -357,7 +357,7 @@ static void check_level(checks *c, const supine_lungs *lungs) {
         lungs->lung_count < 2 ||
             supine_input_judge(SUPINE_INPUT_LUNGS_LEVEL, apart / fmax(depth[0], depth[1])) ==
                 SUPINE_INPUT_TAKEN,
-        SUPINE_OK, SUPINE_REMEDY_NONE, NULL,
+        SUPINE_OK, NULL,
         "the back of one lung lies %.0f mm in front of the other's: check that both lungs are of "
         "one person, in one frame",
         apart);
