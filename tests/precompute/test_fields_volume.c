@@ -433,53 +433,78 @@ static void open_late(const double g[3], double s, size_t vertex, double u[3]) {
   }
 }
 
+/* Move the lungs by open_late. Write the displacement of each vertex, if `u` is given, and the
+ * volume of each lung, mL. */
+static void move_late(const double g[3], double s, double *u, double volume[2]) {
+  const size_t n = lungs.mesh.vertex_count;
+  double *moved = malloc(3 * n * sizeof *moved);
+  for (size_t i = 0; i < n; ++i) {
+    double own[3];
+    open_late(g, s, i, own);
+    for (size_t k = 0; k < 3; ++k) {
+      moved[3 * i + k] = lungs.mesh.vertices[3 * i + k] + own[k];
+    }
+    if (u != NULL) {
+      memcpy(u + 3 * i, own, sizeof own);
+    }
+  }
+  for (size_t lung = 0; lung < lungs.lung_count; ++lung) {
+    supine_mesh part = supine_lungs_part(&lungs, lung);
+    part.vertices = moved;
+    volume[lung] = 1e-3 * supine_mesh_volume(&part);
+  }
+  free(moved);
+}
+
+/* Return the status of a pose in which each lung has a volume, mL, and say why it is refused. */
+static supine_status pose_with(const supine_basis *basis, const double g[3], double left,
+                               double right, supine_error *error) {
+  supine_pose pose;
+  supine_state asked = {.gravity = {g[0], g[1], g[2]}, .lung_count = 2};
+  asked.lungs[0].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, left};
+  asked.lungs[1].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, right};
+  (void)strcpy(asked.lungs[0].name, "left");
+  (void)strcpy(asked.lungs[1].name, "right");
+  return supine_basis_pose(basis, &asked, &pose, error);
+}
+
 TEST(test_fields_over_volume_limits_are_those_that_were_simulated) {
-  enum { EACH = 6, COUNT = 24 * EACH };
+  enum { EACH = 6, COUNT = 24 * EACH, OTHERS = 60 };
   const size_t n = lungs.mesh.vertex_count;
   supine_fields fields = simulate(24, EACH);
   supine_bytes bytes = {.data = NULL};
   supine_basis_report report;
-  double *moved = malloc(3 * n * sizeof *moved);
-  double *held = malloc(SUPINE_LUNGS_MAX * COUNT * sizeof *held);
+  double(*held)[2] = malloc(COUNT * sizeof *held);
   for (size_t run = 0; run < COUNT; ++run) {
-    for (size_t i = 0; i < n; ++i) {
-      double *u = fields.displacement + 3 * (n * run + i);
-      open_late(fields.directions + 3 * run, (double)(run % EACH) / (EACH - 1), i, u);
-      for (size_t k = 0; k < 3; ++k) {
-        moved[3 * i + k] = lungs.mesh.vertices[3 * i + k] + u[k];
-      }
-    }
-    for (size_t lung = 0; lung < lungs.lung_count; ++lung) {
-      supine_mesh part = supine_lungs_part(&lungs, lung);
-      part.vertices = moved;
-      held[SUPINE_LUNGS_MAX * run + lung] = 1e-3 * supine_mesh_volume(&part);
-    }
+    move_late(fields.directions + 3 * run, (double)(run % EACH) / (EACH - 1),
+              fields.displacement + 3 * n * run, held[run]);
   }
   supine_basis *basis = make(&fields, SUPINE_FIELD_STORAGE_BEST, &bytes, &report);
   for (size_t run = 0; run < COUNT; ++run) {
     const double *g = fields.directions + 3 * run;
-    const double *own = held + SUPINE_LUNGS_MAX * run;
-    const double *first = held + SUPINE_LUNGS_MAX * (run - run % EACH);
-    const double range = first[SUPINE_LUNGS_MAX * (EACH - 1)] - first[0];
-    supine_pose pose;
+    const size_t first = run - run % EACH;
+    const double range = held[first + EACH - 1][0] - held[first][0];
     supine_error error = {.message = ""};
-    supine_state asked = {.gravity = {g[0], g[1], g[2]}, .lung_count = 2};
-    for (size_t lung = 0; lung < 2; ++lung) {
-      asked.lungs[lung].volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, own[lung]};
-      (void)snprintf(asked.lungs[lung].name, sizeof asked.lungs[lung].name, "%s",
-                     lung == 0 ? "left" : "right");
-    }
-    if (supine_basis_pose(basis, &asked, &pose, &error) != SUPINE_OK) {
+    if (pose_with(basis, g, held[run][0], held[run][1], &error) != SUPINE_OK) {
       fail_msg("run %zu: %s", run, error.message);
     }
     if (run % EACH == 0 || run % EACH == EACH - 1) {
-      asked.lungs[0].volume.ml += (run % EACH == 0 ? -0.03 : 0.03) * range;
-      assert_int_equal(supine_basis_pose(basis, &asked, &pose, &error), SUPINE_ERROR_NUMERICAL);
+      const double beyond = held[run][0] + (run % EACH == 0 ? -0.03 : 0.03) * range;
+      assert_int_equal(pose_with(basis, g, beyond, held[run][1], &error), SUPINE_ERROR_NUMERICAL);
+    }
+  }
+  for (size_t k = 0; k < OTHERS; ++k) { /* between the directions and the volumes */
+    double g[3];
+    double volume[2];
+    supine_error error = {.message = ""};
+    supine_spiral((double)k, OTHERS, 0.3, g);
+    move_late(g, 0.05 + 0.9 * (double)(7 * k % OTHERS) / OTHERS, NULL, volume);
+    if (pose_with(basis, g, volume[0], volume[1], &error) != SUPINE_OK) {
+      fail_msg("state %zu inside the range: %s", k, error.message);
     }
   }
   supine_basis_close(basis);
   free(bytes.data);
-  free(moved);
   free(held);
   supine_fields_free(&fields);
 }
