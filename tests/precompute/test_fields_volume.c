@@ -145,11 +145,32 @@ static void name_volumes(const double g[3], double s, supine_state *state) {
   free(moved);
 }
 
+static int compare_numbers(const void *first, const void *second) {
+  const double *a = first;
+  const double *b = second;
+  return (*a > *b) - (*a < *b);
+}
+
+/* Assert that the stored error of a vertex is 1 to 3 times the found one, in the median.
+ * @param square  [vertices] sums over `states` of the squared error, mm^2; overwritten */
+static void check_vertices(const supine_basis *basis, double *square, size_t states) {
+  const size_t n = lungs.mesh.vertex_count;
+  const float *stored = supine_basis_tensor(basis, "error_vertices")->data;
+  for (size_t i = 0; i < n; ++i) {
+    square[i] = (double)stored[i] / sqrt(square[i] / (double)states);
+  }
+  qsort(square, n, sizeof *square, compare_numbers);
+  print_message("stored error of a vertex / found: median %.2f, 5 %% %.2f, 95 %% %.2f\n",
+                square[n / 2], square[n / 20], square[n - 1 - n / 20]);
+  assert_true(square[n / 2] > 1.0 && square[n / 2] < 3.0);
+}
+
 /* Assert that states which were not simulated come back within `limit`, relative RMS, with the
  * volumes that were asked. */
 static void check_states(const supine_basis *basis, double limit) {
   const size_t n = lungs.mesh.vertex_count;
   float *xyz = malloc(3 * n * sizeof *xyz);
+  double *square = calloc(n, sizeof *square);
   double error2 = 0.0;
   double size2 = 0.0;
   for (size_t k = 0; k < 10; ++k) {
@@ -172,10 +193,13 @@ static void check_states(const supine_basis *basis, double limit) {
       for (size_t axis = 0; axis < 3; ++axis) {
         const double moved = (double)xyz[3 * i + axis] - lungs.mesh.vertices[3 * i + axis];
         error2 += (moved - u[axis]) * (moved - u[axis]);
+        square[i] += (moved - u[axis]) * (moved - u[axis]);
         size2 += u[axis] * u[axis];
       }
     }
   }
+  check_vertices(basis, square, 10);
+  free(square);
   free(xyz);
   assert_true(sqrt(error2 / size2) < limit);
 }
