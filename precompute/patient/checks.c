@@ -45,17 +45,19 @@ static bool is_told(supine_input_id id, double measured) {
 }
 
 /* How the measures of one person follow the volume: for each, the line y = slope x through x, the
- * logarithm of emptier / fuller volume of all lungs. Its SD is that of people's slopes, times x, and
- * `floor`, of repeated scans at one volume. Of the spreads of a lung, y is the logarithm of emptier
- * / fuller; of the left lung's share of the volume, their difference. Found by
- * tests/evidence/person.py; the floors are assumed. */
+ * logarithm of emptier / fuller volume of all lungs. Its SD is hypot(floor, sd min(|x|, knee)): people
+ * and breaths differ in how much of the first part of a breath lowers the diaphragm or lifts the ribs.
+ * Of the spreads of a lung, y is the logarithm of emptier / fuller; of the left lung's share of the
+ * volume, their difference. Found by tests/evidence/person.py; the floors, of repeated scans at one
+ * volume, and the knee are assumed. */
+static const double knee = 0.25;
 static const struct {
   const char *measure;
   double slope, sd, floor;
-} lines[] = {{"width", 0.209, 0.020, 0.015},
-             {"depth", 0.277, 0.056, 0.015},
-             {"height", 0.336, 0.076, 0.015},
-             {"share", 0.029, 0.020, 0.010}};
+} lines[] = {{"width", 0.212, 0.020, 0.015},
+             {"depth", 0.251, 0.138, 0.015},
+             {"height", 0.405, 0.261, 0.015},
+             {"share", 0.023, 0.040, 0.010}};
 enum { SHARE = 3 };
 
 /* The measure that deviates most from its line. */
@@ -68,7 +70,8 @@ typedef struct deviation {
 static void compare_with_line(size_t line, size_t side, double x, double measured,
                               deviation *worst) {
   const double expected = lines[line].slope * x;
-  const double sds = fabs(measured - expected) / hypot(lines[line].floor, lines[line].sd * x);
+  const double sd = hypot(lines[line].floor, lines[line].sd * fmin(fabs(x), knee));
+  const double sds = fabs(measured - expected) / sd;
   if (sds > worst->sds) {
     *worst = (deviation){line, side, sds, measured, expected};
   }

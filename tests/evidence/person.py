@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure how well scans of one person are told from scans of two people, and landmarks from those of others.
 
-    tests/evidence/person.py BUILD COPD [LOBES...]
+    tests/evidence/person.py BUILD COPD QUIET [LOBES...]
 
 BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, and
-caseNN.csv with landmarks, exhaled then inhaled, mm, LPS. LOBES are label maps of further people. Prints the lines and
+caseNN.csv with landmarks, exhaled then inhaled, mm, LPS. QUIET holds caseNN.csv with landmarks of quiet breaths, which
+stand for lungs: their spread is measured. LOBES are label maps of further people. Prints the lines and
 their spread (precompute/patient/checks.c); the deviation of each own pair of scans from the lines of the others; how
 many pairs of two people deviate by more than the limit of docs/inputs.md from the lines of the rest; the same of own
 pairs that are scaled to a child's size, of single lungs, of pairs without the lower part of one lung, and of scans that
@@ -24,7 +25,7 @@ import numpy as np
 
 # y of the left and the right lung: width, depth, height; and the share of the left lung.
 LINES = {"width": (0, 3), "depth": (1, 4), "height": (2, 5), "left share": (6,)}
-FLOOR, SPREAD, LEAST, LIMIT = np.array([0.015] * 6 + [0.010]), 0.05, 0.02, 3.5
+FLOOR, KNEE, LEAST, LIMIT = np.array([0.015] * 6 + [0.010]), 0.25, 0.02, 3.5
 
 
 def tensors(path):
@@ -65,23 +66,41 @@ def differ(first, second):
     return np.log(smaller / volume), other - measures
 
 
+def breath(path):
+    """Return the logarithm of the volume ratio of a quiet breath, and how the spreads of its landmarks differ."""
+    rows = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :6]
+    first, second = rows[:, :3], rows[:, 3:]
+    left = first[:, 0] > (first[:, 0].min() + first[:, 0].max()) / 2
+    growth, spreads = [], []
+    for side in (left, ~left):
+        affine = np.linalg.lstsq(np.c_[first[side], np.ones(side.sum())], second[side], rcond=None)[0][:3]
+        growth.append(np.log(np.linalg.det(affine)))
+        spreads.append(np.log(second[side].std(0) / first[side].std(0)))
+    return -np.mean(growth), -np.r_[spreads[0], spreads[1], np.nan]
+
+
 def fit(own):
-    """Return the slopes of the lines of own pairs, and their spread among people."""
-    x, y = np.array([each[0] for each in own]), np.array([each[1] for each in own])
+    """Return the slopes of the lines of own pairs, and their SD among people: chi square is as expected."""
     slope, sd = np.zeros(7), np.zeros(7)
     for columns in map(list, LINES.values()):
-        along, floor = np.tile(x, len(columns)), FLOOR[columns[0]]
-        across, weight = y[:, columns].T.ravel(), 1 / (floor ** 2 + (SPREAD * along) ** 2)
-        slope[columns] = (weight * along) @ across / (weight @ along ** 2)
-        n, rest = len(along), across - slope[columns[0]] * along
-        sd[columns] = np.sqrt(max((rest @ rest * n / (n - 1) - n * floor ** 2) / (along @ along), LEAST ** 2))
+        floor, here = FLOOR[columns[0]], [each for each in own if np.isfinite(each[1][columns]).all()]
+        along = np.tile([each[0] for each in here], len(columns))
+        across = np.array([each[1][columns] for each in here]).T.ravel()
+        near, found = np.minimum(abs(along), KNEE), 0.1
+        for _ in range(20):
+            weight = 1 / (floor ** 2 + (found * near) ** 2)
+            line = (weight * along) @ across / (weight @ along ** 2)
+            tried = np.linspace(LEAST, 0.6, 2000)
+            chi = ((across - line * along) ** 2 / (floor ** 2 + np.outer(tried, near) ** 2)).sum(1)
+            found = tried[min(np.searchsorted(-chi, 1 - len(along)), len(tried) - 1)]
+        slope[columns], sd[columns] = line, found
     return slope, sd
 
 
 def deviation(pair, lines):
     """Return the largest deviation of a pair of scans from lines, SD."""
     (x, y), (slope, sd) = pair, lines
-    return (np.abs(y - x * slope) / np.hypot(FLOOR, sd * x)).max()
+    return np.nanmax(np.abs(y - x * slope) / np.hypot(FLOOR, sd * min(abs(x), KNEE)))
 
 
 def without_base(basis):
@@ -99,15 +118,16 @@ def single(basis, lung):
     return volume, np.r_[sizes, sizes, 1.0]
 
 
-def compare(bases, people, further):
+def compare(bases, people, quiet, further):
     """Print how pairs of scans deviate from the lines of people who are not in them."""
     scans = {key: measure(basis) for key, basis in bases.items()}
-    own = {p: differ(scans[p, "insp"], scans[p, "exp"]) for p in people}
+    own = {**{p: differ(scans[p, "insp"], scans[p, "exp"]) for p in people}, **{path: breath(path) for path in quiet}}
     lines = fit(list(own.values()))
     without = lambda *names: fit([pair for p, pair in own.items() if p not in names])
     print("lines:", *(f"{name} {lines[0][c[0]]:.3f} ({lines[1][c[0]]:.3f})" for name, c in LINES.items()))
     show = lambda title, change: print(title, *(f"{deviation(change(p), without(p)):.1f}" for p in people))
     show("own pairs, SD:", own.get)
+    print("quiet breaths:", *(f"{deviation(own[p], without(p)):.1f}" for p in quiet))
     changed = lambda p, first, second=None: differ(first(bases[p, "insp"]), (second or first)(bases[p, "exp"]))
     scaled = lambda by: lambda basis: measure({**basis, "vertices": basis["vertices"] * np.float32(by)})
     show("own pairs without the base of a lung:", lambda p: changed(p, lambda basis: measure(without_base(basis))))
@@ -123,7 +143,7 @@ def compare(bases, people, further):
     print(f"two people ({len(people)} and {len(further)}): {above} of {len(wrong)} above {LIMIT} SD")
 
 
-def main(build, copd, *lobes):
+def main(build, copd, quiet, *lobes):
     supine = os.path.abspath(os.path.join(build, "supine"))
     people = sorted(os.path.basename(path)[:-4] for path in glob.glob(copd + "/case*.csv"))
     if not people or not os.path.exists(supine):
@@ -146,7 +166,7 @@ def main(build, copd, *lobes):
         bases = {(p, s): basis(f"{copd}/{p}_{s}.nii.gz", f"{p}_{s}.safetensors")
                  for p, s in itertools.product(people, ("exp", "insp"))}
         bases.update({(path, ""): basis(path, "further.safetensors", "--labels", "lobes") for path in lobes})
-        compare(bases, people, lobes)
+        compare(bases, people, sorted(glob.glob(os.path.abspath(quiet) + "/case*.csv")), lobes)
         for state, columns in (("exp", slice(0, 3)), ("insp", slice(3, 6))):
             marks = {p: np.genfromtxt(f"{copd}/{p}.csv", delimiter=",", skip_header=1)[:, columns] for p in people}
             share = np.array([[outside(marks[p], f"{q}_{state}.safetensors") for p in people] for q in people])
@@ -157,6 +177,6 @@ def main(build, copd, *lobes):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
+    if len(sys.argv) < 4:
         sys.exit(__doc__)
     main(*sys.argv[1:])
