@@ -28,9 +28,7 @@ bool supine_kriging_factor(size_t count, double *matrix) {
   return true;
 }
 
-/* Solve L x = b for the lower triangle L [count, count] in `factor`. Replace b in `x` by the
- * solution. */
-static void forward(size_t count, const double *factor, double *x) {
+void supine_kriging_forward(size_t count, const double *factor, double *x) {
   for (size_t i = 0; i < count; ++i) {
     double sum = x[i];
     for (size_t k = 0; k < i; ++k) {
@@ -40,14 +38,20 @@ static void forward(size_t count, const double *factor, double *x) {
   }
 }
 
-size_t supine_kriging_space(size_t count) {
-  return count * (count + SUPINE_KRIGING_COLUMNS + 3);
+void supine_kriging_backward(size_t count, const double *factor, double *x) {
+  for (size_t i = count; i-- > 0;) {
+    x[i] /= factor[i * count + i];
+    for (size_t k = 0; k < i; ++k) {
+      x[k] -= factor[i * count + k] * x[i];
+    }
+  }
 }
 
-/* Return the column of supine_kriging.whitened that `term` (0 to 2: translation, 3: volume, 4 to 6:
- * rotation) multiplies in the residual along `axis`. Write the sign of the product, or 0 if the
- * term does not change this coordinate. */
-static int column_of(size_t term, size_t axis, double *sign) {
+size_t supine_kriging_space(size_t count) {
+  return count * (2 * count + SUPINE_KRIGING_COLUMNS + 3 + TERMS + 2);
+}
+
+int supine_kriging_column(size_t term, size_t axis, double *sign) {
   *sign = 1;
   if (term < 3) {
     *sign = term == axis ? 1 : 0;
@@ -86,7 +90,7 @@ static void whiten(supine_kriging *fit) {
     }
   }
   for (size_t c = 0; c < SUPINE_KRIGING_COLUMNS; ++c) {
-    forward(n, fit->factor, fit->whitened + c * n);
+    supine_kriging_forward(n, fit->factor, fit->whitened + c * n);
   }
 }
 
@@ -119,6 +123,21 @@ static double prior_of(const supine_kriging_options *options, size_t term, doubl
   return deviation > 0 ? 1 / (deviation * deviation) : 0;
 }
 
+/* Add the prior of the translation along an axis to the normal equations. */
+static void add_axis(const supine_kriging_options *options, double a[TERMS * TERMS],
+                     double right[TERMS]) {
+  const double deviation = options->axis_deviation;
+  if (deviation > 0) {
+    for (size_t k = 0; k < 3; ++k) {
+      const double precise = options->axis[k] / (deviation * deviation);
+      right[k] += precise * options->axis_mean;
+      for (size_t l = 0; l <= k; ++l) {
+        a[k * TERMS + l] += precise * options->axis[l];
+      }
+    }
+  }
+}
+
 /* Compute A and the right side of the normal equations for the fitted terms: translation, volume
  * and rotation.
  *
@@ -127,10 +146,11 @@ static double prior_of(const supine_kriging_options *options, size_t term, doubl
  *     X  what each term, if it is 1, adds to each coordinate of each point
  *     K  covariance matrix of the coordinates of the points
  *     y  residuals: observed minus predicted coordinates of the points
- *     P  inverse covariance of the prior of the terms (prior_of)
+ *     P  inverse covariance of the prior of the terms (prior_of, add_axis)
  *     m  mean of the prior
  *
- * If a term is not fitted, its row of A is a row of the identity. */
+ * Positions along the lines of points, if there are any, are eliminated (supine_kriging.along). If
+ * a term is not fitted, its row of A is a row of the identity. */
 static void normal_equations(const supine_kriging *fit, const supine_kriging_options *options,
                              double a[TERMS * TERMS], double right[TERMS]) {
   const size_t n = fit->count;
@@ -146,15 +166,23 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
     a[k * TERMS + k] = precision;
     for (size_t axis = 0; axis < 3; ++axis) {
       double sign = 0;
-      const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
+      const double *x = fit->whitened + (size_t)supine_kriging_column(k, axis, &sign) * n;
       right[k] += sign * dot(n, x, fit->whitened + (VALUE + axis) * n);
       for (size_t l = 0; l <= k; ++l) {
         double other = 0;
-        const double *z = fit->whitened + (size_t)column_of(l, axis, &other) * n;
+        const double *z = fit->whitened + (size_t)supine_kriging_column(l, axis, &other) * n;
         a[k * TERMS + l] += is_known(options, l) ? 0 : sign * other * dot(n, x, z);
       }
     }
+    if (fit->lines != NULL) {
+      const double *seen = fit->along + k * n;
+      right[k] -= dot(n, seen, fit->along + TERMS * n);
+      for (size_t l = 0; l <= k; ++l) {
+        a[k * TERMS + l] -= is_known(options, l) ? 0 : dot(n, seen, fit->along + l * n);
+      }
+    }
   }
+  add_axis(options, a, right);
 }
 
 /* Return whether the points determine all fitted terms. They do if each pivot of `factor`, the
@@ -177,7 +205,7 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
   for (size_t k = 0; k < TERMS; ++k) {
     memset(inverse[k], 0, sizeof inverse[k]);
     inverse[k][k] = 1;
-    forward(TERMS, factor, inverse[k]);
+    supine_kriging_forward(TERMS, factor, inverse[k]);
   }
   memset(fit->terms, 0, sizeof fit->terms);
   memset(fit->spread, 0, sizeof fit->spread);
@@ -190,8 +218,8 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
       for (size_t axis = 0; axis < 3; ++axis) {
         double one = 0;
         double other = 0;
-        const int from = column_of(k, axis, &one);
-        const int to = column_of(l, axis, &other);
+        const int from = supine_kriging_column(k, axis, &one);
+        const int to = supine_kriging_column(l, axis, &other);
         fit->spread[from][to] += one * other * c;
       }
     }
@@ -205,12 +233,59 @@ static void find_weights(supine_kriging *fit) {
     memcpy(weights, fit->whitened + (VALUE + axis) * n, n * sizeof *weights);
     for (size_t k = 0; k < TERMS; ++k) {
       double sign = 0;
-      const double *x = fit->whitened + (size_t)column_of(k, axis, &sign) * n;
+      const double *x = fit->whitened + (size_t)supine_kriging_column(k, axis, &sign) * n;
       for (size_t j = 0; j < n; ++j) {
         weights[j] -= sign * fit->terms[k] * x[j];
       }
     }
   }
+}
+
+static supine_status refuse_covariance(supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
+                          "the points' covariance is not positive definite: give each point "
+                          "a noise above 0");
+}
+
+static bool has_lines(const supine_kriging *fit) {
+  for (size_t j = 0; j < fit->count; ++j) {
+    if (fit->points[j].on_line) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Compute the restricted log likelihood of the residuals from the solved normal equations. */
+static double find_likelihood(const supine_kriging *fit, const supine_kriging_options *options,
+                              const double factor[TERMS * TERMS], const double right[TERMS]) {
+  const size_t n = fit->count;
+  const double shift = options->axis_deviation;
+  double sum = -dot(TERMS, fit->terms, right);
+  for (size_t i = 0; i < n; ++i) {
+    sum += 6 * log(fit->factor[i * n + i]);
+  }
+  for (size_t k = 0; k < TERMS; ++k) {
+    double mean = 0;
+    const double precision = prior_of(options, k, &mean);
+    sum += 2 * log(factor[k * TERMS + k]) + precision * mean * mean -
+           (precision > 0 ? log(precision) : 0);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const double *y = fit->whitened + (VALUE + axis) * n;
+    sum += dot(n, y, y);
+  }
+  if (fit->lines != NULL) {
+    const double *y = fit->along + TERMS * n;
+    sum -= dot(n, y, y);
+    for (size_t i = 0; i < n; ++i) {
+      sum += 2 * log(fit->lines[i * n + i]);
+    }
+  }
+  if (shift > 0) {
+    sum += pow(options->axis_mean / shift, 2) + 2 * log(shift);
+  }
+  return -0.5 * sum;
 }
 
 supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
@@ -220,6 +295,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
       (supine_kriging){.model = options->model, .points = points, .count = count, .factor = space};
   fit->whitened = space + count * count;
   fit->weights = fit->whitened + SUPINE_KRIGING_COLUMNS * count;
+  fit->lines = fit->weights + 3 * count;
+  fit->along = fit->lines + count * count;
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       const supine_kriging_point *p = &points[i];
@@ -230,11 +307,15 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
     fit->factor[i * count + i] += points[i].noise * points[i].noise;
   }
   if (!supine_kriging_factor(count, fit->factor)) {
-    return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                            "the points' covariance is not positive definite: give each point "
-                            "a noise above 0");
+    return refuse_covariance(error);
   }
   whiten(fit);
+  double *scratch = fit->along + (TERMS + 1) * count;
+  if (!has_lines(fit)) {
+    fit->lines = fit->along = NULL;
+  } else if (!supine_kriging_add_lines(fit, scratch)) {
+    return refuse_covariance(error);
+  }
   double a[TERMS * TERMS];
   double factor[TERMS * TERMS];
   double right[TERMS];
@@ -247,46 +328,43 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   }
   solve_terms(fit, options, factor, right);
   find_weights(fit);
-  double sum = -dot(TERMS, fit->terms, right);
-  for (size_t i = 0; i < count; ++i) {
-    sum += 6 * log(fit->factor[i * count + i]);
+  if (fit->lines != NULL) {
+    supine_kriging_weigh_lines(fit, scratch);
   }
-  for (size_t k = 0; k < TERMS; ++k) {
-    double mean = 0;
-    const double precision = prior_of(options, k, &mean);
-    sum += 2 * log(factor[k * TERMS + k]) + precision * mean * mean -
-           (precision > 0 ? log(precision) : 0);
-  }
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const double *y = fit->whitened + (VALUE + axis) * count;
-    sum += dot(count, y, y);
-  }
-  fit->log_likelihood = -0.5 * sum;
+  fit->log_likelihood = find_likelihood(fit, options, factor, right);
   return SUPINE_OK;
 }
 
 /* Compute the inverse covariance [3, 3] of the error of predicting one point from all others. It is
- * the block of this point in K^-1 - K^-1 X C X' K^-1. K is the covariance matrix of the coordinates
- * of all points, X holds the regressors of the fitted terms, and C is the covariance of these
- * terms.
+ * the block of this point in W - W X C X' W. X holds the regressors of the fitted terms, C is the
+ * covariance of these terms. W is K^-1, with the covariance matrix K of the coordinates of all
+ * points, less what is known of the positions along lines: W = K^-1 - K^-1 D (D' K^-1 D)^-1 D'
+ * K^-1.
  * @param row  [count] column of L^-1 for this point, where K = L L' on each axis */
 static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
   const size_t n = fit->count;
-  double column[VALUE];
-  for (size_t c = 0; c < VALUE; ++c) {
-    column[c] = dot(n, row, fit->whitened + c * n);
+  double seen[3 * SUPINE_KRIGING_POINTS_MAX];
+  double terms[3][TERMS]; /* rows of X' W for the coordinates of the point */
+  if (fit->lines != NULL) {
+    double weights[SUPINE_KRIGING_POINTS_MAX];
+    memcpy(weights, row, n * sizeof *row);
+    supine_kriging_backward(n, fit->factor, weights);
+    supine_kriging_project_lines(fit, weights, seen);
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t k = 0; k < TERMS; ++k) {
+      double sign = 0;
+      const double *column = fit->whitened + (size_t)supine_kriging_column(k, a, &sign) * n;
+      terms[a][k] = sign * dot(n, row, column);
+      terms[a][k] -= fit->lines != NULL ? dot(n, fit->along + k * n, seen + a * n) : 0;
+    }
   }
   for (size_t a = 0; a < 3; ++a) {
     for (size_t b = 0; b < 3; ++b) {
       double sum = a == b ? dot(n, row, row) : 0;
+      sum -= fit->lines != NULL ? dot(n, seen + a * n, seen + b * n) : 0;
       for (size_t k = 0; k < TERMS; ++k) {
-        for (size_t l = 0; l < TERMS; ++l) {
-          double one = 0;
-          double other = 0;
-          const double x = column[column_of(k, a, &one)];
-          const double z = column[column_of(l, b, &other)];
-          sum -= one * other * x * z * fit->covariance[k][l];
-        }
+        sum -= terms[a][k] * dot(TERMS, fit->covariance[k], terms[b]);
       }
       block[3 * a + b] = sum;
     }
@@ -296,12 +374,19 @@ static void leave_out_block(const supine_kriging *fit, const double *row, double
 double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
                                 double *scratch) {
   const size_t n = fit->count;
+  const supine_kriging_point *p = &fit->points[point];
   double block[9];
   memset(scratch, 0, n * sizeof *scratch);
   scratch[point] = 1;
-  forward(n, fit->factor, scratch);
+  supine_kriging_forward(n, fit->factor, scratch);
   leave_out_block(fit, scratch, block);
-  const double least = 1e-9 * dot(n, scratch, scratch);
+  const double scale = dot(n, scratch, scratch);
+  const double least = 1e-9 * scale;
+  if (p->on_line) { /* along its line, the block is 0 */
+    for (size_t k = 0; k < 9; ++k) {
+      block[k] += scale * p->direction[k / 3] * p->direction[k % 3];
+    }
+  }
   bool alone = !supine_kriging_factor(3, block);
   for (size_t a = 0; a < 3; ++a) {
     alone = alone || block[4 * a] * block[4 * a] < least;
@@ -313,13 +398,13 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double 
   }
   double trace = 0;
   double solved[3];
-  forward(3, block, residual);
+  supine_kriging_forward(3, block, residual);
   for (size_t k = 0; k < 3; ++k) {
     double unit[3] = {k == 0, k == 1, k == 2};
-    forward(3, block, unit);
+    supine_kriging_forward(3, block, unit);
     trace += dot(3, unit, unit);
     solved[k] = dot(3, unit, residual);
   }
   memcpy(residual, solved, sizeof solved);
-  return sqrt(trace);
+  return sqrt(fmax(0, trace - (p->on_line ? 1 / scale : 0)));
 }

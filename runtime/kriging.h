@@ -13,6 +13,9 @@
  *     g    random field, whose coordinates on x, y and z are independent
  *     noise  error of the observed position, independent for each point and axis
  *
+ * A point that was seen along a line has one more number that is fitted, and of which nothing is
+ * known before: how far along the line it lies. Its residual then counts across the line only.
+ *
  * Each coordinate of g has the covariance, mm^2,
  *
  *     cov(g(p_i), g(p_j)) = (sill / 3) sqrt(|u_i| |u_j|) q (1 + a) exp(-a)
@@ -58,6 +61,8 @@ typedef struct supine_kriging_point {
   double size;        /**< length of the displacement from the scan, mm */
   double noise;       /**< standard deviation of the observed position on each axis, mm, above 0 */
   size_t lung;
+  bool on_line;        /**< whether only the residual across `direction` was observed */
+  double direction[3]; /**< unit vector of the line */
 } supine_kriging_point;
 
 /** Options of a fit. A translation is always fitted. `volume` and `rotation` tell whether to fit a
@@ -68,6 +73,9 @@ typedef struct supine_kriging_options {
   double volume_mean; /**< prior mean of the change of the volume, in prior standard deviations */
   double rotation_mean[3];   /**< prior mean of the rotation vector, rad */
   double rotation_deviation; /**< prior standard deviation about each axis, rad; 0 for no prior */
+  double axis[3];            /**< unit vector along which the translation has a prior */
+  double axis_mean;          /**< prior mean of the translation along `axis`, mm */
+  double axis_deviation;     /**< prior standard deviation along `axis`, mm; 0 for no prior */
 } supine_kriging_options;
 
 typedef struct supine_kriging {
@@ -81,6 +89,12 @@ typedef struct supine_kriging {
    * its position minus `centre` [3]; its residual [3]. */
   double *whitened;
   double *weights; /**< [3, count] L^-1 (residuals - their fit by `terms`), with L in `factor` */
+  /** [count, count] Cholesky factor G of D' K^-1 D, where column j of D is the direction of the
+   * line of point j, at its coordinates; for a point, a row of the identity. NULL without lines. */
+  double *lines;
+  /** [SUPINE_KRIGING_TERMS + 1, count] G^-1 D' K^-1 times what each term adds, then times the
+   * residuals. */
+  double *along;
   /** Fitted translation [3], mm, volume change, prior standard deviations, and rotation [3], rad; 0
    * where not fitted. */
   double terms[SUPINE_KRIGING_TERMS];
@@ -122,6 +136,39 @@ static inline double supine_kriging_covariance(const supine_kriging_model *model
  * triangle. Return false if the matrix is not positive definite. */
 bool supine_kriging_factor(size_t count, double *matrix);
 
+/** Solve L x = b for the lower triangle L [count, count] in `factor`. Replace b in `x` by the
+ * solution. */
+void supine_kriging_forward(size_t count, const double *factor, double *x);
+
+/** As supine_kriging_forward, for L' x = b. */
+void supine_kriging_backward(size_t count, const double *factor, double *x);
+
+/** Return the column of supine_kriging.whitened that `term` (0 to 2: translation, 3: volume, 4 to
+ * 6: rotation) multiplies in the residual along `axis`. Write the sign of the product, or 0 if the
+ * term does not change this coordinate. */
+int supine_kriging_column(size_t term, size_t axis, double *sign);
+
+/** Compute `lines` and `along` of a fit.
+ * @param scratch  [count] work space
+ * @return whether the points' covariance is positive definite */
+bool supine_kriging_add_lines(supine_kriging *fit, double *scratch);
+
+/** Take what is fitted along the lines out of `weights`. */
+void supine_kriging_weigh_lines(supine_kriging *fit, double *scratch);
+
+/** Compute G^-1 D' (weights e_a) for the unit vector e_a of each axis; G and D as in
+ * supine_kriging.lines.
+ * @param weights  [count] weights of the points
+ * @param seen     [3, count] written */
+void supine_kriging_project_lines(const supine_kriging *fit, const double *weights, double *seen);
+
+/** Compute the variance, summed over x, y and z, that the fitted terms and the positions along the
+ * lines add to a prediction, mm^2.
+ * @param row  [SUPINE_KRIGING_TERMS] row of X for the predicted point, minus its prediction from
+ * the rows of the observed points (vary in kriging_predict.c)
+ * @param w    [count] L^-1 times the covariances with the observed points; replaced */
+double supine_kriging_line_variance(const supine_kriging *fit, const double *row, double *w);
+
 size_t supine_kriging_space(size_t count);
 
 /** Fit translation, volume and rotation, if selected by the options, and the random field to the
@@ -136,7 +183,8 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
 /** Predict the residual of an observed point from all other points.
  * @param residual  [3] residual minus its prediction, mm, written
  * @param scratch   [count] work space
- * @return expected RMS length of this difference, mm; 0 if no prediction is possible */
+ * @return expected RMS length of this difference, mm; 0 if no prediction is possible. Across the
+ *   line, for a point on a line */
 double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
                                 double *scratch);
 

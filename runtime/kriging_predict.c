@@ -88,6 +88,22 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
   }
 }
 
+/* Add what the fitted terms and the positions along lines leave to the variances. */
+static void vary_lines(const supine_kriging *fit, float (*column)[RUN], float (*w)[RUN],
+                       float *variance) {
+  for (size_t v = 0; v < RUN; ++v) {
+    double weights[SUPINE_KRIGING_POINTS_MAX];
+    double row[COLUMNS];
+    for (size_t j = 0; j < fit->count; ++j) {
+      weights[j] = (double)w[j][v];
+    }
+    for (size_t c = 0; c < COLUMNS; ++c) {
+      row[c] = (double)column[c][v];
+    }
+    variance[v] += (float)supine_kriging_line_variance(fit, row, weights);
+  }
+}
+
 /* Compute the variance of the prediction, summed over x, y and z, at each of RUN points, mm^2:
  *
  *     3 (k - w'w) + m' S m        m = h - sum over j of w_j h_j
@@ -96,7 +112,9 @@ static void solve(const supine_kriging *fit, size_t lung, const run *in, float (
  *     w_j  L^-1 times the covariances with the observed points j (solve)
  *     S    covariance of the fitted terms (supine_kriging.spread)
  *     h    seven numbers of this point: 1, shift by the volume [3], position - centre [3]
- *     h_j  the same numbers of observed point j, times L^-1 (supine_kriging.whitened) */
+ *     h_j  the same numbers of observed point j, times L^-1 (supine_kriging.whitened)
+ *
+ * With lines, supine_kriging_line_variance replaces m' S m. */
 static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], float *variance) {
   float column[COLUMNS][RUN];
   for (size_t v = 0; v < RUN; ++v) {
@@ -112,6 +130,7 @@ static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], floa
   }
   for (size_t c = 0; c < COLUMNS; ++c) {
     if (fit->spread[c][c] == 0) {
+      memset(column[c], 0, sizeof column[c]);
       continue;
     }
     project(fit->count, w, fit->whitened + c * fit->count, column[c]);
@@ -127,12 +146,15 @@ static void vary(const supine_kriging *fit, const run *in, float (*w)[RUN], floa
     }
     for (size_t d = 0; d <= c; ++d) {
       const float number = (float)((d < c ? 2 : 1) * fit->spread[c][d]);
-      if (fit->spread[d][d] != 0) {
+      if (fit->spread[d][d] != 0 && fit->lines == NULL) {
         for (size_t v = 0; v < RUN; ++v) {
           variance[v] += number * column[c][v] * column[d][v];
         }
       }
     }
+  }
+  if (fit->lines != NULL) {
+    vary_lines(fit, column, w, variance);
   }
 }
 

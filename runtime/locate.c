@@ -12,6 +12,7 @@
 #include "runtime/expected.h"
 #include "runtime/location.h"
 #include "runtime/rigid.h"
+#include "runtime/sight.h"
 #include "runtime/simulated.h"
 
 _Static_assert((int)SUPINE_LOCATE_POINTS_MAX == (int)SUPINE_KRIGING_POINTS_MAX,
@@ -46,7 +47,7 @@ static const double excess_from = 1.5;
 static const double sill_of_error = 4.0 / 3;
 
 /* Largest number of Gauss-Newton steps, and of times that a step of the volume is halved. */
-enum { STEPS_MAX = 20, HALVINGS_MAX = 8 };
+enum { STEPS_MAX = 20, HALVINGS_MAX = 8, ROUGH_STEPS = 30 };
 
 typedef struct workspace {
   const supine_locate_task *task;
@@ -56,6 +57,7 @@ typedef struct workspace {
   double *law;                  /* [task->count, 3] predicted positions before correction, mm */
   double *kriging; /* [supine_kriging_space(task->count)] work space of supine_kriging_fit */
   double *scratch; /* [task->count] work space of supine_kriging_leave_out */
+  double *seen;    /* [task->count, 3] observed positions; on a line, near the prediction, mm */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -64,7 +66,7 @@ static size_t doubles_of(size_t bytes) {
 
 size_t supine_locate_space(size_t count) {
   return doubles_of(sizeof(supine_location)) + doubles_of(count * sizeof(supine_kriging_point)) +
-         4 * count + supine_kriging_space(count);
+         7 * count + supine_kriging_space(count);
 }
 
 static void place_in(double *space, size_t count, workspace *s) {
@@ -75,7 +77,8 @@ static void place_in(double *space, size_t count, workspace *s) {
   space += doubles_of(count * sizeof *s->points);
   s->law = space;
   s->scratch = space + 3 * count;
-  s->kriging = space + 4 * count;
+  s->seen = space + 4 * count;
+  s->kriging = space + 7 * count;
 }
 
 static supine_status check(const supine_locate_task *task, supine_error *error) {
@@ -84,20 +87,24 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu observed points: give 1 to %d",
                             task->count, (int)SUPINE_LOCATE_POINTS_MAX);
   }
-  if (task->rigid && task->count < 3) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "a rotation needs three observed points, not %zu", task->count);
+  if (!(task->depth >= 0 && isfinite(task->depth))) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "depth %g mm: give a number above 0",
+                            task->depth);
   }
   for (size_t j = 0; j < task->count; ++j) {
     const supine_observation *o = &task->observed[j];
-    const double sum = o->position[0] + o->position[1] + o->position[2];
-    if (o->vertex >= n || !isfinite(sum) || !(o->noise > 0) || !isfinite(o->noise)) {
-      return supine_error_set(
-          error, SUPINE_ERROR_ARGUMENT,
-          "observation %zu has vertex %zu: give a vertex below %zu, a finite position and a noise "
-          "above 0",
-          j + 1, o->vertex, n);
+    if (o->vertex >= n || !supine_sight_valid(o) || !(o->noise > 0) || !isfinite(o->noise)) {
+      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                              "observation %zu has vertex %zu: give a vertex below %zu, a finite "
+                              "position, a noise above "
+                              "0, and for a line two finite positions that differ",
+                              j + 1, o->vertex, n);
     }
+  }
+  const size_t different = supine_sight_count(task->count, task->observed);
+  if (task->rigid && different < 3) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "a rotation needs three observed points, not %zu", different);
   }
   return SUPINE_OK;
 }
@@ -148,7 +155,8 @@ static supine_status initialise(workspace *s, supine_error *error) {
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < task->count; ++j) {
       supine_kriging_point *p = &s->points[j];
-      *p = (supine_kriging_point){.noise = task->observed[j].noise};
+      *p = (supine_kriging_point){.noise = task->observed[j].noise,
+                                  .on_line = task->observed[j].on_line};
       position(basis, &pose, task->observed[j].vertex, p->position);
       while (task->observed[j].vertex >= info->lung_begin[p->lung + 1]) {
         ++p->lung;
@@ -159,6 +167,9 @@ static supine_status initialise(workspace *s, supine_error *error) {
       .info = {.state = task->state, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}},
       .options = {.model = supine_kriging_default, .volume = unknown, .rotation = task->rigid},
       .deviation = unknown ? prior_spread * supine_expected_reference(basis) : 0};
+  if (supine_sight_unseen(task->count, task->observed, s->fit->axis)) {
+    s->fit->options.axis_deviation = task->depth > 0 ? task->depth : SUPINE_LOCATE_DEPTH_MM;
+  }
   if (unknown) {
     s->found->state.volume = begin_volume(basis, task->state.gravity);
   }
@@ -204,32 +215,56 @@ static supine_status evaluate(workspace *s, supine_error *error) {
   return status;
 }
 
-/* For the current rotation, compute the translation from the mean predicted to the mean observed
- * position (supine_location.origin), and the residual of each point in the frame of the basis. */
-static void find_residuals(workspace *s) {
+/* Rotate a vector from the frame of the observations to that of the basis. */
+static void rotate_back(const double rotation[9], const double x[3], double rotated[3]) {
+  for (size_t i = 0; i < 3; ++i) {
+    rotated[i] = rotation[i] * x[0] + rotation[3 + i] * x[1] + rotation[6 + i] * x[2];
+  }
+}
+
+/* For the current rotation, find the observed positions, and the translation from the mean
+ * predicted to the mean observed position (supine_location.origin). Turn lines to the frame of the
+ * basis. */
+static void place_points(workspace *s) {
   const size_t n = s->task->count;
-  supine_location_info *found = s->found;
+  const double *rotation = s->found->rotation;
+  supine_kriging_options *options = &s->fit->options;
   double mean[3] = {0};
   double observed[3] = {0};
+  double centre[3];
+  for (size_t j = 0; j < n; ++j) {
+    rotate(rotation, s->law + 3 * j, s->seen + 3 * j);
+  }
+  supine_sight_place(n, s->task->observed, s->seen, s->fit->axis, fmax(options->axis_deviation, 1),
+                     s->seen);
   for (size_t j = 0; j < n; ++j) {
     for (size_t i = 0; i < 3; ++i) {
       mean[i] += s->law[3 * j + i] / (double)n;
-      observed[i] += s->task->observed[j].position[i] / (double)n;
+      observed[i] += s->seen[3 * j + i] / (double)n;
+    }
+    if (s->points[j].on_line) {
+      double direction[3];
+      supine_sight_direction(&s->task->observed[j], direction);
+      rotate_back(rotation, direction, s->points[j].direction);
     }
   }
-  rotate(found->rotation, mean, s->fit->origin);
+  rotate(rotation, mean, centre);
+  options->axis_mean = 0;
   for (size_t i = 0; i < 3; ++i) {
-    s->fit->origin[i] = observed[i] - s->fit->origin[i];
+    s->fit->origin[i] = observed[i] - centre[i];
+    options->axis_mean -= s->fit->axis[i] * (observed[i] - mean[i]);
   }
-  for (size_t j = 0; j < n; ++j) {
+  rotate_back(rotation, s->fit->axis, options->axis);
+}
+
+/* Compute the residual of each point in the frame of the basis, for the current rotation. */
+static void find_residuals(workspace *s) {
+  place_points(s);
+  for (size_t j = 0; j < s->task->count; ++j) {
     double d[3];
-    for (size_t i = 0; i < 3; ++i) {
-      d[i] = s->task->observed[j].position[i] - s->fit->origin[i];
-    }
-    for (size_t i = 0; i < 3; ++i) {
-      s->points[j].residual[i] = found->rotation[i] * d[0] + found->rotation[3 + i] * d[1] +
-                                 found->rotation[6 + i] * d[2] - s->law[3 * j + i];
-    }
+    supine_subtract(s->seen + 3 * j, s->fit->origin, d);
+    rotate_back(s->found->rotation, d, s->points[j].residual);
+    supine_subtract(s->points[j].residual, s->law + 3 * j, s->points[j].residual);
   }
 }
 
@@ -251,7 +286,7 @@ static supine_rigid_motion find_motion(const workspace *s) {
     float observed[3];
     for (size_t i = 0; i < 3; ++i) {
       law[i] = (float)s->law[3 * j + i];
-      observed[i] = (float)s->task->observed[j].position[i];
+      observed[i] = (float)s->seen[3 * j + i];
     }
     supine_rigid_add(&motion, law, observed, 1);
   }
@@ -273,7 +308,7 @@ static void find_turn(workspace *s) {
       law[i] = (float)s->law[3 * j + i];
     }
     for (size_t i = 0; i < 3; ++i) {
-      const double observed = s->task->observed[j].position[i];
+      const double observed = s->seen[3 * j + i];
       straight += pow(observed - (double)law[i] - motion.to[i] + motion.from[i], 2);
       turned += pow(observed - supine_rigid_move(&motion, law, i), 2);
     }
@@ -281,11 +316,25 @@ static void find_turn(workspace *s) {
   s->found->turn = n > 3 && turned < straight / 16 ? angle_of(motion.rotation, vector) : 0;
 }
 
-/* Set the rotation to the one that moves the predicted positions closest to the observed ones. */
+static bool sighted(const workspace *s) {
+  for (size_t j = 0; j < s->task->count; ++j) {
+    if (s->points[j].on_line) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Set the rotation to the one that moves the predicted positions closest to the observed ones.
+ * Points on lines are found again after each rotation. */
 static void rotate_roughly(workspace *s) {
-  const supine_rigid_motion motion = find_motion(s);
+  const size_t steps = sighted(s) ? ROUGH_STEPS : 1;
   double vector[3];
-  memcpy(s->found->rotation, motion.rotation, sizeof motion.rotation);
+  for (size_t step = 0; step < steps; ++step) {
+    const supine_rigid_motion motion = find_motion(s);
+    memcpy(s->found->rotation, motion.rotation, sizeof motion.rotation);
+    place_points(s);
+  }
   s->fit->options.rotation_deviation =
       angle_of(s->found->rotation, vector) > other_frame ? 0 : rotation_spread;
 }
@@ -375,16 +424,17 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
     supine_locate_residual *r = &residuals[j];
     double d[3];
     const double noise = s->task->observed[j].noise;
+    const double axes = s->points[j].on_line ? 2 : 3; /* along which the distance counts */
     const double extra = s->points[j].noise * s->points[j].noise - noise * noise;
     r->sigma = supine_kriging_leave_out(&s->fit->kriging, j, d, s->scratch);
-    r->sigma = sqrt(fmax(0, r->sigma * r->sigma - 3 * extra));
+    r->sigma = sqrt(fmax(0, r->sigma * r->sigma - axes * extra));
     r->distance = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     if (r->outlier) {
       continue;
     }
     sum += r->distance * r->distance;
     expected += r->sigma * r->sigma;
-    noises += 3 * noise * noise;
+    noises += axes * noise * noise;
     ++used;
     const double ratio = r->sigma > 0 ? r->distance / r->sigma : 1;
     ratios += ratio * ratio;
@@ -406,8 +456,7 @@ static supine_status refuse_place(const workspace *s, supine_error *error) {
   double seen = 0;
   double scanned = 0;
   for (size_t j = 0; j < 3 * s->task->count; ++j) {
-    const supine_observation *o = s->task->observed;
-    seen += pow(o[j / 3].position[j % 3] - o->position[j % 3], 2);
+    seen += pow(s->seen[j] - s->seen[j % 3], 2);
     scanned += pow(s->points[j / 3].position[j % 3] - s->points->position[j % 3], 2);
   }
   return seen >= spread_least * spread_least * scanned
@@ -454,10 +503,11 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
   const size_t n = s->task->count;
   supine_status status = initialise(s, error);
   if (status == SUPINE_OK) {
-    status = refuse_place(s, error);
+    status = evaluate(s, error);
   }
   if (status == SUPINE_OK) {
-    status = evaluate(s, error);
+    place_points(s);
+    status = refuse_place(s, error);
   }
   if (status == SUPINE_OK && s->task->rigid) {
     rotate_roughly(s);
@@ -533,6 +583,14 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
   rotate(found->rotation, s.fit->kriging.terms, found->translation);
   for (size_t i = 0; i < 3; ++i) {
     found->translation[i] += s.fit->origin[i];
+  }
+  if (s.fit->options.axis_deviation > 0) {
+    double square = 0;
+    for (size_t k = 0; k < 9; ++k) {
+      square += s.fit->options.axis[k / 3] * s.fit->options.axis[k % 3] *
+                s.fit->kriging.covariance[k / 3][k % 3];
+    }
+    found->depth_error = s.fit->factor * sqrt(fmax(0, square));
   }
   found->log_evidence = s.fit->kriging.log_likelihood;
   return status;

@@ -40,10 +40,12 @@ static void predict(const supine_location *fit, const supine_expected_model *mod
 /* Convert the corrected positions to the frame of the observations, and write the expected errors
  * of kriging. If at least three points were observed and no rotation was fitted, limit each to the
  * expected error without observations. For two points, this limit would be too small (0.85 of the
- * true error). For a fitted rotation, it would ignore the error of the rotation. */
+ * true error). For a fitted rotation, it would ignore the error of the rotation, and for lines of
+ * sight that along the lines. */
 static void finish(const supine_location *fit, const block *b, size_t count, float *xyz,
                    float *sigma) {
-  const bool bounded = !fit->options.rotation && fit->kriging.count >= 3;
+  const bool bounded =
+      !fit->options.rotation && fit->kriging.lines == NULL && fit->kriging.count >= 3;
   for (size_t i = 0; i < count; ++i) {
     double body[3];
     double variance = (double)b->variance[i];

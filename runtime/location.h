@@ -15,6 +15,7 @@ struct supine_location {
   supine_kriging_options options;
   /** Mean of the observed positions, minus the rotated mean of the predicted positions, mm. */
   double origin[3];
+  double axis[3];   /**< direction that no view sees, in the frame of the observations; 0 if none */
   double deviation; /**< prior standard deviation of the volume, mL; 0 if the volume is known */
   double factor;    /**< factor on the expected errors, from the residuals of the points */
   double excess;    /**< variance that the residuals leave beyond the expected errors, mm^2 */

@@ -27,18 +27,21 @@ static supine_status no_memory(const reading *r) {
   return supine_error_memory(r->error, "%zu points of %s", r->points.count, r->path);
 }
 
-/* Append a point. Convert it from `axes` and `unit`, unless the options name others. */
-static supine_status add(reading *r, const double at[3], const char *name, supine_axes axes,
-                         double unit) {
+/* Append a point, and the source of its line of sight or NAN. Convert both from `axes` and `unit`,
+ * unless the options name others. */
+static supine_status add(reading *r, const double at[3], const double from[3], const char *name,
+                         supine_axes axes, double unit) {
   supine_io_points *p = &r->points;
   char number[24];
   if (p->count == r->room) {
     const size_t room = 2 * r->room + 64;
     double *more = realloc(p->at, 3 * room * sizeof *more);
     p->at = more != NULL ? more : p->at;
+    double *sources = realloc(p->from, 3 * room * sizeof *sources);
+    p->from = sources != NULL ? sources : p->from;
     char **names = realloc(p->names, room * sizeof *names);
     p->names = names != NULL ? names : p->names;
-    if (more == NULL || names == NULL) {
+    if (more == NULL || sources == NULL || names == NULL) {
       return no_memory(r);
     }
     r->room = room;
@@ -46,10 +49,14 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
   (void)snprintf(number, sizeof number, "%zu", p->count + 1);
   const supine_mesh_load_options none = {.axes = SUPINE_AXES_AUTO};
   const supine_mesh_load_options *given = r->options != NULL ? r->options : &none;
-  memcpy(p->at + 3 * p->count, at, 3 * sizeof *at);
-  supine_mesh_axes_apply(given->axes != SUPINE_AXES_AUTO ? given->axes : axes,
-                         given->millimetres_per_unit > 0.0 ? given->millimetres_per_unit : unit,
-                         p->at + 3 * p->count);
+  const double *const read[] = {at, from};
+  double *const written[] = {p->at + 3 * p->count, p->from + 3 * p->count};
+  for (size_t k = 0; k < 2; ++k) {
+    memcpy(written[k], read[k], 3 * sizeof *at);
+    supine_mesh_axes_apply(given->axes != SUPINE_AXES_AUTO ? given->axes : axes,
+                           given->millimetres_per_unit > 0.0 ? given->millimetres_per_unit : unit,
+                           written[k]);
+  }
   p->names[p->count] = strdup(name != NULL && name[0] != '\0' ? name : number);
   if (p->names[p->count] == NULL) {
     return no_memory(r);
@@ -63,9 +70,41 @@ static supine_status add(reading *r, const double at[3], const char *name, supin
 
 /* Columns of a table of points. 3D Slicer names the coordinates by its axes, and says in `defined`
  * whether a point was placed. */
-static const char *const columns[] = {"x", "y", "z",    "l",     "p",      "s",
-                                      "r", "a", "name", "label", "defined"};
-enum { XYZ = 0, LPS = 3, RAS = 6, NAME = 8, LABEL, DEFINED, COLUMNS };
+static const char *const columns[] = {"x",       "y",      "z",      "l",     "p",
+                                      "s",       "r",      "a",      "name",  "label",
+                                      "defined", "from_x", "from_y", "from_z"};
+enum { XYZ = 0, LPS = 3, RAS = 6, NAME = 8, LABEL, DEFINED, FROM, COLUMNS = FROM + 3 };
+
+static const double nowhere[3] = {NAN, NAN, NAN};
+
+/* Read the source of the line of sight of the point `at`: three numbers, or nothing. */
+static supine_status read_source(const reading *r, supine_csv *csv, const double at[3],
+                                 double from[3]) {
+  size_t given = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const char *text = supine_csv_text(csv, FROM + k);
+    given += text != NULL && text[strspn(text, " ")] != '\0';
+  }
+  memcpy(from, nowhere, sizeof nowhere);
+  if (given == 0) {
+    return SUPINE_OK;
+  }
+  SUPINE_REFUSE_IF(
+      given != 3, r->error, SUPINE_ERROR_FORMAT,
+      "%s:%zu: %zu of from_x, from_y and from_z: give all three for a line of sight, or "
+      "none for a point",
+      r->path, csv->line, given);
+  for (size_t k = 0; k < 3; ++k) {
+    SUPINE_TRY(supine_csv_number(csv, FROM + k, columns[FROM + k], &from[k], r->error));
+  }
+  SUPINE_REFUSE_IF(
+      hypot(hypot(at[0] - from[0], at[1] - from[1]), at[2] - from[2]) < 1e-6, r->error,
+      SUPINE_ERROR_FORMAT,
+      "%s:%zu: the line of sight ends where it begins: give in x,y,z another place on it "
+      "than in from_x,from_y,from_z",
+      r->path, csv->line);
+  return SUPINE_OK;
+}
 
 /* Add the points in the rows of a table, whose coordinates are in three columns. */
 static supine_status read_rows(reading *r, supine_csv *csv, const size_t column[3],
@@ -77,20 +116,23 @@ static supine_status read_rows(reading *r, supine_csv *csv, const size_t column[
     }
     const char *defined = supine_csv_text(csv, DEFINED);
     double at[3];
+    double from[3];
     if (defined != NULL && strcmp(defined, "0") == 0) {
       continue; /* 3D Slicer: the point was not placed */
     }
     for (size_t k = 0; k < 3; ++k) {
       SUPINE_TRY(supine_csv_number(csv, column[k], columns[column[k]], &at[k], r->error));
     }
+    SUPINE_TRY(read_source(r, csv, at, from));
     const char *name = supine_csv_text(csv, NAME);
     name = name != NULL && name[0] != '\0' ? name : supine_csv_text(csv, LABEL);
     /* the table converts to mm what names its unit; an option's unit replaces that */
     const bool given = r->options != NULL && r->options->millimetres_per_unit > 0.0;
     for (size_t k = 0; k < 3; ++k) {
       at[k] /= given ? supine_csv_scale(csv, column[k]) : 1.0;
+      from[k] /= given ? supine_csv_scale(csv, FROM + k) : 1.0;
     }
-    SUPINE_TRY(add(r, at, name, axes, 1.0));
+    SUPINE_TRY(add(r, at, from, name, axes, 1.0));
   }
 }
 
@@ -214,7 +256,8 @@ static supine_status read_markup(reading *r, const json_t *markup) {
                      SUPINE_ERROR_FORMAT,
                      "%s: control point %zu has no position of three numbers: place or delete it",
                      r->path, i + 1);
-    SUPINE_TRY(add(r, at, json_string_value(json_object_get(point, "label")), axes, scale));
+    SUPINE_TRY(
+        add(r, at, nowhere, json_string_value(json_object_get(point, "label")), axes, scale));
   }
   return SUPINE_OK;
 }
@@ -269,5 +312,6 @@ void supine_io_points_free(supine_io_points *points) {
   }
   free(points->names);
   free(points->at);
+  free(points->from);
   *points = (supine_io_points){0};
 }

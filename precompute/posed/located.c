@@ -89,6 +89,7 @@ static void suggest_reading(const supine_locate_task *task, bool posture_given,
       memcpy(other, task->observed, task->count * sizeof *other);
       for (size_t j = 0; j < 3 * task->count; ++j) {
         other[j / 3].position[j % 3] *= readings[i].factor[j % 3];
+        other[j / 3].from[j % 3] *= readings[i].factor[j % 3];
       }
       if (try_postures(&changed, posture_given, located, NULL) == SUPINE_OK &&
           10.0 * pow(located->best->residual_rms, 2.0) < most * most) {

@@ -21,7 +21,7 @@ typedef struct request {
   const char *output, *points;
   supine_orientation orientation;
   supine_state state; /* the volume is fitted if its kind is SUPINE_VOLUME_DEFAULT */
-  double noise;
+  double noise, depth;
   bool rigid, json;
   supine_mesh_load_options load;
 } request;
@@ -41,15 +41,22 @@ static const supine_option table[] = {
      "deviation 3 degrees), unless the points show more than 30 degrees. By default only a "
      "translation is fitted",
      SUPINE_FILLS(request, rigid)},
-    {"noise", 0, "MM", "standard deviation of an observed coordinate", SUPINE_FILLS(request, noise),
-     .standard = "2", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
+    {"noise", 0, "MM",
+     "standard deviation of an observed coordinate; of a line of sight, across it, at the point",
+     SUPINE_FILLS(request, noise), .standard = "2", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
+    {"depth", 0, "MM",
+     "standard deviation of how far the observations' frame is translated along the lines of sight "
+     "from the frame of the scan, if all lines have one source or are parallel, and no point is "
+     "known "
+     "in space",
+     SUPINE_FILLS(request, depth), .standard = "20", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
     {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
 
 typedef struct observations {
-  size_t count;
+  size_t count, lines; /* all, and those that are lines of sight */
   supine_observation points[SUPINE_LOCATE_POINTS_MAX];
 } observations;
 
@@ -89,6 +96,9 @@ static supine_status load_observed(const char *path, const request *wanted,
     supine_observation *point = &observed->points[observed->count];
     point->noise = wanted->noise;
     memcpy(point->position, read.at + 3 * observed->count, sizeof point->position);
+    memcpy(point->from, read.from + 3 * observed->count, sizeof point->from);
+    point->on_line = isfinite(point->from[0]);
+    observed->lines += point->on_line;
     SUPINE_TRY(find_vertex(path, read.names[observed->count], names, &point->vertex, error));
   }
   return SUPINE_OK;
@@ -126,6 +136,19 @@ static void say_outliers(const supine_options_names *names, const observations *
   }
 }
 
+/* Return the number of different points: several rows of one name are several views of it. */
+static size_t count_points(const observations *observed) {
+  size_t different = 0;
+  for (size_t j = 0; j < observed->count; ++j) {
+    size_t first = 0;
+    while (observed->points[first].vertex != observed->points[j].vertex) {
+      ++first;
+    }
+    different += first == j;
+  }
+  return different;
+}
+
 static void print(const request *wanted, const supine_options_names *names,
                   const observations *observed, size_t n, double volume,
                   const supine_posed_located *located) {
@@ -141,8 +164,8 @@ static void print(const request *wanted, const supine_options_names *names,
   char text[160];
   (void)supine_state_describe(&posture, text, sizeof text);
   supine_options_print(
-      json_pack("{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:I, "
-                "s:f, s:o}",
+      json_pack("{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:o*, "
+                "s:I, s:o*, s:f, s:o}",
                 "file", supine_options_json_text(wanted->output), "points", (json_int_t)n,
                 "expected_rms_mm", located->expected_rms, "expected_largest_mm",
                 located->expected_largest, "posture", text, "probability_percent",
@@ -152,8 +175,11 @@ static void print(const request *wanted, const supine_options_names *names,
                 "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
                 "translation_mm", t[0], t[1], t[2], "rotation_degrees",
                 wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
-                "observed_points", (json_int_t)observed->count, "residual_rms_mm",
-                best->residual_rms, "outliers", outliers_of(names, observed, located->residuals)),
+                "depth_deviation_mm", best->depth_error > 0.0 ? json_real(best->depth_error) : NULL,
+                "observed_points", (json_int_t)count_points(observed), "lines_of_sight",
+                observed->lines > 0 ? json_integer((json_int_t)observed->lines) : NULL,
+                "residual_rms_mm", best->residual_rms, "outliers",
+                outliers_of(names, observed, located->residuals)),
       wanted->json);
 }
 
@@ -220,8 +246,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, false, &lungs, error));
   SUPINE_TRY(supine_options_inside_open(lungs, wanted->points, &inside, &names, error));
   SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
-  const supine_locate_task task = {inside, observed.count, observed.points, wanted->state,
-                                   wanted->rigid};
+  const supine_locate_task task = {inside,        observed.count, observed.points,
+                                   wanted->state, wanted->rigid,  wanted->depth};
   const supine_status status =
       supine_posed_locate(&task, wanted->orientation.given, csv ? inside : lungs, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
@@ -233,7 +259,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_location_check(located.best, &findings);
   supine_options_say_findings(name, &findings);
   say_outliers(&names, &observed, located.residuals);
-  if (observed.count < OUTLIER_POINTS) {
+  if (count_points(&observed) < OUTLIER_POINTS) {
     supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
                        (int)OUTLIER_POINTS);
   }
@@ -245,17 +271,25 @@ const supine_command supine_command_locate = {
     name,
     "find the whole lung from a few observed points",
     .usage = "BASIS OBSERVED --points INSIDE [--posture NAME] [--volume VOLUME] -o FILE",
-    .about = "Fits the lungs to a few points observed inside them, for example by a navigation "
-             "system. Finds the volume and the translation between the frames of the scan and of "
-             "the observations, and corrects the predicted positions near the points. OBSERVED is "
-             "a .mrk.json or .fcsv of 3D Slicer, or a CSV with the columns name,x,y,z, with the "
-             "names given "
-             "to 'supine embed'.",
+    .about =
+        "Fits the lungs to a few points observed inside them, for example by a navigation "
+        "system. Finds the volume and the translation between the frames of the scan and of "
+        "the observations, and corrects the predicted positions near the points. OBSERVED is "
+        "a .mrk.json or .fcsv of 3D Slicer, or a CSV with the columns name,x,y,z, with the "
+        "names given to 'supine embed'. In the columns from_x,from_y,from_z of the CSV, a row "
+        "may have the source of a line of sight, in the same frame: the point lies on the line "
+        "from there through x,y,z, as an X-ray or a camera shows it. Several rows of one name "
+        "are several views.",
     .options = table,
     .notes = "Expected errors are " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
              " They are multiplied by a factor that the residuals of the points decide. A few "
              "points seldom determine the posture: give --posture. Without it, six postures are "
              "tried, and the error includes the differences between them.\n"
+             "\n"
+             "Two views from different sources show a point in space. One view shows where it lies "
+             "across the lines, but hardly how far along them: its position there is that of the "
+             "scan's frame, within --depth, and the expected errors contain it. Give a smaller "
+             "--depth if the distance is known, as from the spine.\n"
              "\n"
              "Examples:\n"
              "  supine embed lungs.safetensors airways.csv -o inside.safetensors\n"

@@ -126,6 +126,7 @@ static const struct {
               {NULL, "control", "control parameters c1 to c5"},
               {NULL, "control_interval", "  confidence interval, +-"},
               {NULL, "corrected", "law and kriging"},
+              {NULL, "depth_deviation_mm", "  along the lines of sight, standard deviation, mm"},
               {NULL, "determined", "posture determined by the points"},
               {NULL, "deviation_without_points_ml", "  without the points, mL"},
               {"error", "directions", "held-out directions"},

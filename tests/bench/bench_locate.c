@@ -165,7 +165,7 @@ typedef struct sums {
 } sums;
 
 static void predict(const person *p, const size_t *drawn, size_t count, double prior, sums *s) {
-  static double space[DRAWN * (DRAWN + 13)];
+  static double space[DRAWN * (2 * DRAWN + 22)];
   supine_kriging_point points[DRAWN];
   supine_kriging fit;
   supine_error error;

@@ -210,6 +210,20 @@ found = lungs.locate(seen, observed, "left", "rest+300")
 assert list(np.flatnonzero(found.outliers)) == [7] and found.volume_error == 0
 assert (found.positions(lungs)[1] <= np.maximum(3.01, 1.001 * lungs.expected_error("left", "rest+300"))).all()
 assert (lungs.expected_error("scan") == 0).all()
+# Two views, rows of one vertex, show where the points are; one view leaves the depth to its prior.
+place = truth[seen] + np.array([12, -7, 20])
+source = np.array([[12.0, -700, 20], [400, -560, 20]])
+views = np.concatenate([a + 1.5 * (place - a) for a in source]), np.repeat(source, len(seen), axis=0)
+found = lungs.locate(seen * 2, views[0], "left", "rest+300", sources=views[1])
+assert found.depth_error == 0 and np.abs(found.translation - [12, -7, 20]).max() < 0.5, found.translation
+found = lungs.locate(seen, views[0][:len(seen)], "left", "rest+300", sources=views[1][:len(seen)], depth=9)
+assert 2 < found.depth_error < 9 and np.abs(found.translation - [12, -7, 20]).max() < 9, found.depth_error
+mixed = np.where(np.arange(len(seen))[:, None] % 2, views[1][:len(seen)], np.nan)
+found = lungs.locate(seen, np.where(np.isnan(mixed), place, views[0][:len(seen)]), "left", "rest+300", sources=mixed)
+assert found.depth_error == 0 and np.abs(found.translation - [12, -7, 20]).max() < 0.5, found.translation
+refused(ValueError, "sources", lungs.locate, [0, 1], truth[:2], sources=truth[:1])
+refused(supine.ArgumentError, "two finite positions that differ", lungs.locate, [0], truth[:1], sources=truth[:1])
+refused(supine.ArgumentError, "depth", lungs.locate, seen, place, depth=-1)
 refused(supine.ArgumentError, "observed points", lungs.locate, [], [])
 refused(supine.ArgumentError, "give a vertex below", lungs.locate, [n], [(0, 0, 0)])
 refused(supine.ArgumentError, "three", lungs.locate, [0, 1], truth[:2], rigid=True)

@@ -21,6 +21,7 @@ static double normal(uint64_t *state) {
 static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
   for (size_t j = 0; j < count; ++j) {
     supine_kriging_point *p = &points[j];
+    *p = (supine_kriging_point){.noise = 1};
     p->lung = fixture_random(seed) > 0;
     for (size_t i = 0; i < 3; ++i) {
       const double half[3] = {45, 80, 120};
@@ -31,7 +32,19 @@ static void place(uint64_t *seed, size_t count, supine_kriging_point *points) {
     p->volume[0] = 0;
     p->volume[1] = -0.1 * down;
     p->volume[2] = -0.3 * down;
-    p->noise = 1;
+  }
+}
+
+/* Set the direction of a point's line to a random unit vector. */
+static void aim(uint64_t *seed, supine_kriging_point *p) {
+  double square = 0;
+  p->on_line = true;
+  for (size_t i = 0; i < 3; ++i) {
+    p->direction[i] = fixture_random(seed) + 0.1;
+    square += p->direction[i] * p->direction[i];
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    p->direction[i] /= sqrt(square);
   }
 }
 
@@ -108,6 +121,100 @@ TEST(test_kriging_leave_out_equals_fit_without_the_point) {
     for (size_t i = 0; i < 3; ++i) {
       assert_true(fabs(left[i] - points[SEEN - 1].residual[i] + (double)shift[i]) < 1e-3);
     }
+  }
+  free(space);
+  free(other_space);
+}
+
+/* Three lines of unit noise at right angles see each coordinate twice: they equal a point of noise
+ * sqrt(1/2), wherever on its line each position is. */
+TEST(test_kriging_three_lines_at_right_angles_equal_a_point) {
+  enum { TRIPLES = 6 };
+  uint64_t seed = 23;
+  supine_kriging_point points[TRIPLES + 1];
+  supine_kriging_point lines[3 * TRIPLES];
+  const double terms[7] = {3, -2, 8, 0.4, 0.02, -0.01, 0.03};
+  place(&seed, TRIPLES + 1, points);
+  draw(&seed, TRIPLES + 1, points, terms);
+  double *space = fixture_allocate(supine_kriging_space(TRIPLES), sizeof *space);
+  double *other_space = fixture_allocate(supine_kriging_space(3 * TRIPLES), sizeof *space);
+  const supine_kriging_options options = {.model = supine_kriging_default,
+                                          .volume = true,
+                                          .rotation = true,
+                                          .volume_mean = 0.3,
+                                          .rotation_deviation = 0.05,
+                                          .axis = {0.6, 0, 0.8},
+                                          .axis_mean = 2,
+                                          .axis_deviation = 5};
+  for (size_t j = 0; j < 3 * (size_t)TRIPLES; ++j) {
+    lines[j] = points[j / 3];
+    lines[j].on_line = true;
+    lines[j].direction[j % 3] = 1;
+    lines[j].residual[j % 3] += 40 * fixture_random(&seed);
+  }
+  for (size_t j = 0; j < TRIPLES; ++j) {
+    points[j].noise = sqrt(0.5);
+  }
+  supine_kriging by_points;
+  supine_kriging by_lines;
+  assert_int_equal(supine_kriging_fit(&options, TRIPLES, points, space, &by_points, NULL),
+                   SUPINE_OK);
+  assert_int_equal(supine_kriging_fit(&options, 3 * TRIPLES, lines, other_space, &by_lines, NULL),
+                   SUPINE_OK);
+  for (size_t k = 0; k < SUPINE_KRIGING_TERMS; ++k) {
+    assert_true(fabs(by_points.terms[k] - by_lines.terms[k]) < 1e-6);
+    for (size_t l = 0; l < SUPINE_KRIGING_TERMS; ++l) {
+      assert_true(fabs(by_points.covariance[k][l] - by_lines.covariance[k][l]) < 1e-6);
+    }
+  }
+  for (size_t j = 0; j <= TRIPLES; ++j) { /* observed points and one that was not */
+    float shift[2][3];
+    float variance[2];
+    predict(&by_points, &points[j], shift[0], &variance[0]);
+    predict(&by_lines, &points[j], shift[1], &variance[1]);
+    assert_true(fabs((double)(variance[0] - variance[1])) < 1e-3 * (double)variance[0]);
+    for (size_t i = 0; i < 3; ++i) {
+      assert_true(fabs((double)(shift[0][i] - shift[1][i])) < 1e-3);
+    }
+  }
+  free(space);
+  free(other_space);
+}
+
+/* What a fit says of a line that it leaves out is what a fit without the line says across it. */
+TEST(test_kriging_leave_out_line_equals_fit_without_the_line) {
+  uint64_t seed = 31;
+  supine_kriging_point points[SEEN];
+  const double terms[7] = {12, -7, 20, 0.8, 0.02, -0.01, 0.03};
+  place(&seed, SEEN, points);
+  draw(&seed, SEEN, points, terms);
+  for (size_t j = 0; j < SEEN; j += 2) {
+    aim(&seed, &points[j]);
+  }
+  aim(&seed, &points[SEEN - 1]);
+  double *space = fixture_allocate(supine_kriging_space(SEEN), sizeof *space);
+  double *other_space = fixture_allocate(supine_kriging_space(SEEN), sizeof *space);
+  const supine_kriging_options options = {.model = supine_kriging_default, .volume = true};
+  supine_kriging fit;
+  supine_kriging without;
+  double left[3];
+  double scratch[SEEN];
+  assert_int_equal(supine_kriging_fit(&options, SEEN, points, space, &fit, NULL), SUPINE_OK);
+  const double sigma = supine_kriging_leave_out(&fit, SEEN - 1, left, scratch);
+  assert_int_equal(supine_kriging_fit(&options, SEEN - 1, points, other_space, &without, NULL),
+                   SUPINE_OK);
+  const supine_kriging_point *p = &points[SEEN - 1];
+  float shift[3];
+  float variance = 0;
+  double along = 0;
+  predict(&without, p, shift, &variance);
+  for (size_t i = 0; i < 3; ++i) {
+    along += p->direction[i] * (p->residual[i] - (double)shift[i]);
+  }
+  assert_true(sigma * sigma < (double)variance + 2 && sigma > 1);
+  for (size_t i = 0; i < 3; ++i) {
+    const double across = p->residual[i] - (double)shift[i] - along * p->direction[i];
+    assert_true(fabs(left[i] - across) < 2e-3);
   }
   free(space);
   free(other_space);
@@ -203,7 +310,7 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
 TEST(test_kriging_rotation_of_collinear_points_refused) {
   uint64_t seed = 9;
   supine_kriging_point points[4];
-  double space[4 * 17];
+  double space[4 * 30];
   assert_int_equal(supine_kriging_space(4), sizeof space / sizeof *space);
   place(&seed, 4, points);
   supine_kriging fit;

@@ -239,11 +239,15 @@ TEST(test_locate_bad_task_refused) {
   const supine_state truth = state_of("supine:rest");
   observe(w, &truth, false);
   const supine_observation good = w->seen[0];
-  const supine_observation bad[] = {{VERTICES, {0, 0, 0}, 1},
-                                    {0, {0, (double)NAN, 0}, 1},
-                                    {0, {0, 0, (double)INFINITY}, 1},
-                                    {0, {0, 0, 0}, 0},
-                                    {0, {0, 0, 0}, (double)NAN}};
+  const supine_observation bad[] = {
+      {.vertex = VERTICES, .noise = 1},
+      {.position = {0, (double)NAN, 0}, .noise = 1},
+      {.position = {0, 0, (double)INFINITY}, .noise = 1},
+      {.noise = 0},
+      {.noise = (double)NAN},
+      {.noise = 1, .on_line = true},
+      {.noise = 1, .on_line = true, .from = {1, (double)NAN, 0}},
+      {.noise = 1, .on_line = true, .from = {0, 0, (double)-INFINITY}}};
   const supine_location *found = NULL;
   supine_error error;
   supine_locate_task task = {
@@ -255,6 +259,12 @@ TEST(test_locate_bad_task_refused) {
     assert_null(found);
   }
   w->seen[0] = good;
+  for (size_t i = 0; i < 2; ++i) {
+    task.depth = i == 0 ? -1 : (double)NAN;
+    assert_int_equal(supine_locate(&task, w->residuals, w->space, &found, &error),
+                     SUPINE_ERROR_ARGUMENT);
+  }
+  task.depth = 0;
   const size_t counts[] = {0, SUPINE_LOCATE_POINTS_MAX + 1};
   for (size_t i = 0; i < 2; ++i) {
     task.count = counts[i];
@@ -389,6 +399,57 @@ TEST(test_expected_relative_error_is_that_of_the_difference) {
   }
   assert_true(square[2][SUPINE_EXPECTED_DISPLACEMENT] <
               0.7 * square[0][SUPINE_EXPECTED_DISPLACEMENT]);
+}
+
+/* Replace each observed point by lines from `views` sources, 700 mm away and 30 degrees apart. */
+static void view(const world *w, size_t views, supine_observation *lines) {
+  for (size_t j = 0; j < views * SEEN; ++j) {
+    const double angle = (double)(j % views) * 0.52;
+    const double source[3] = {512 + 700 * sin(angle), -207 - 700 * cos(angle), 1020};
+    lines[j] = w->seen[j / views];
+    lines[j].on_line = true;
+    for (size_t i = 0; i < 3; ++i) { /* a detector behind the lungs */
+      lines[j].position[i] += 0.5 * (lines[j].position[i] - source[i]);
+      lines[j].from[i] = source[i];
+    }
+  }
+}
+
+TEST(test_locate_lines_of_two_views_equal_points_and_one_view_leaves_the_depth) {
+  world *w = *state;
+  const supine_state truth = state_of("prone:rest+300");
+  supine_observation lines[2 * SEEN];
+  supine_locate_residual residuals[2 * SEEN];
+  double *space = fixture_allocate(supine_locate_space(2 * SEEN), sizeof *space);
+  float xyz[3 * VERTICES];
+  float sigma[3][VERTICES];
+  observe(w, &truth, false);
+  const supine_location *found = locate(w, &truth, false);
+  assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma[0], NULL), SUPINE_OK);
+  assert_true(supine_location_get_info(found)->depth_error == 0);
+  supine_locate_task task = {.inside = w->basis, .observed = lines, .state = truth};
+  for (size_t views = 1; views < 3; ++views) {
+    view(w, views, lines);
+    task.count = views * SEEN;
+    task.depth = views == 1 ? 400 : 0; /* the frame is translated by 207 mm along one view */
+    assert_int_equal(supine_locate(&task, residuals, space, &found, NULL), SUPINE_OK);
+    const double depth = supine_location_get_info(found)->depth_error;
+    const double missed = miss(w, found, &truth, false);
+    print_message("%zu views: positions err by %.2f mm, depth is known to %.1f mm\n", views, missed,
+                  depth);
+    if (views == 1) {
+      assert_true(depth > 5 && depth < 400 && missed < depth);
+    } else {
+      assert_true(depth == 0 && missed < 0.5);
+    }
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma[views], NULL), SUPINE_OK);
+    assert_true(sigma[1][0] > sigma[0][0]);
+  }
+  assert_true(sigma[2][0] < sigma[1][0]);
+  task.rigid = true; /* two vertices, however many views */
+  task.count = 4;
+  assert_int_equal(supine_locate(&task, residuals, space, &found, NULL), SUPINE_ERROR_ARGUMENT);
+  free(space);
 }
 
 /* A random wrong half of the points must raise the stated errors; what no patient has is refused.

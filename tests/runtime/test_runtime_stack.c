@@ -116,7 +116,8 @@ static void use_location(work *w) {
   for (size_t j = 0; j < SEEN; ++j) {
     const size_t at = j * VERTICES / SEEN;
     const float *x = w->xyz + 3 * at;
-    w->seen[j] = (supine_observation){at, {(double)x[0], (double)x[1], (double)x[2]}, 1};
+    w->seen[j] = (supine_observation){
+        .vertex = at, .position = {(double)x[0], (double)x[1], (double)x[2]}, .noise = 1};
   }
   const supine_locate_task task = {
       .inside = w->basis, .count = SEEN, .observed = w->seen, .state = w->state, .rigid = true};

@@ -124,21 +124,35 @@ SUPINE_API supine_status supine_expected_parts(const supine_basis *basis, const 
 
 enum { SUPINE_LOCATE_POINTS_MAX = 300 };
 
-/** One observed point, a vertex of a basis. The frame of all observed positions may be translated
- * from the frame of the basis and, if supine_locate_task.rigid is true, rotated. */
+/** Standard deviation of the translation of the observations' frame along what no view sees, mm, if
+ * none is given: assumed. */
+#define SUPINE_LOCATE_DEPTH_MM 20.0
+
+/** One observation of a point, a vertex of a basis: its position, or a line on which it lies, as a
+ * camera or an X-ray shows it. Several observations of one vertex are several views of it. The
+ * frame of all observed positions may be translated from the frame of the basis and, if
+ * supine_locate_task.rigid is true, rotated. */
 typedef struct supine_observation {
   size_t vertex;      /**< index of the vertex in the basis supine_locate_task.inside */
-  double position[3]; /**< observed position, mm */
-  double noise; /**< standard deviation of `position` per axis, mm, above 0; give 2 if unknown */
+  double position[3]; /**< observed position, or any other place than `from` on the line, mm */
+  double noise; /**< standard deviation of `position` per axis, mm, above 0; give 2 if unknown. For
+                   a line: on each axis across it, at the point */
+  bool on_line; /**< whether the point lies on the line from `from` through `position` */
+  double from[3]; /**< source of the line, as that of an X-ray, mm; ignored for a point */
 } supine_observation;
 
 /** The input of supine_locate. */
 typedef struct supine_locate_task {
   const supine_basis *inside; /**< basis that has the observed points as vertices */
-  size_t count; /**< number of points, 1 to SUPINE_LOCATE_POINTS_MAX; at least 3 if `rigid` */
+  size_t count; /**< number of observations, 1 to SUPINE_LOCATE_POINTS_MAX; of at least 3 vertices
+                   if `rigid` */
   const supine_observation *observed; /**< [count] observed points */
   supine_state state; /**< posture and volume; SUPINE_VOLUME_DEFAULT if the volume is unknown */
   bool rigid;         /**< whether to find a rotation in addition to the translation */
+  /** If all observations are lines from one source, or parallel: prior standard deviation, mm, of
+   * the translation of the frame along them, about 0; 0 for SUPINE_LOCATE_DEPTH_MM. Points and a
+   * second view replace it. */
+  double depth;
 } supine_locate_task;
 
 /** Lungs that supine_locate found, in the `space` given to it. */
@@ -156,8 +170,10 @@ typedef struct supine_location_info {
   double log_evidence;   /**< log likelihood, for comparing tasks that differ only in the posture */
   size_t outlier_count;  /**< number of points that were left out as outliers */
   double residual_expected; /**< expected RMS of the distances in `residual_rms`, mm */
-  double turn; /**< turn of the points' frame that would quarter the residuals, rad, where no
-                  rotation was to be found; 0 if there is none */
+  double turn;        /**< turn of the points' frame that would quarter the residuals, rad, where no
+                         rotation was to be found; 0 if there is none */
+  double depth_error; /**< standard deviation of the translation along one view, mm; 0 if several
+                         views or points fix it */
 } supine_location_info;
 
 /** Comparison of an observed point with its prediction by all other points. */
@@ -190,6 +206,10 @@ SUPINE_API size_t supine_locate_space(size_t count);
  * A rotation has a prior with standard deviation 3 degrees about each axis, unless the points are
  * turned by more than 30 degrees: then their frame is another one. Cost: about 0.2 ms for 20
  * points, 0.1 s for 300.
+ *
+ * Of a point on a line, only the distance across the line counts. One view shows nothing of how far
+ * the lungs are: that is supine_locate_task.depth before, and all stated errors contain it.
+ * Lines of two views cost five times as much.
  * @param residuals  [count], written
  * @param space      [supine_locate_space(count)]; keep it as long as `found` is used
  * @param found      written; after a failure, NULL or a location for supine_location_get_info alone

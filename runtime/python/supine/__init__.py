@@ -480,15 +480,20 @@ class Basis:
                 for name, count in enumerate(np.bincount(part)) if count == 1}
 
     def locate(self, vertices: Sequence[int], positions: ArrayLike, state: Gravity = _SUPINE, volume: Volume = "", *,
-               noise: float = 2.0, rigid: bool = False) -> Location:
+               noise: float = 2.0, rigid: bool = False, sources: Optional[ArrayLike] = None,
+               depth: float = 0.0) -> Location:
         """Find the lungs from observed positions of vertices. This basis has these vertices; `embed` usually makes it.
 
         vertices: index of the vertex of each of the n observed points
         positions: [n, 3] observed positions, mm, in a frame that may be translated from the frame of the basis and,
             if `rigid` is true, rotated
         volume: empty if the volume is unknown and must be found
-        noise: standard deviation of a position on each axis, mm"""
-        return Location(self, vertices, positions, _state(state, volume), noise, rigid)
+        noise: standard deviation of a position on each axis, mm; of a line, across it
+        sources: [n, 3] places, mm: each point lies on the line from its source through its position, as an X-ray shows
+            it; rows of NaN for points whose position is known. Several lines of one vertex are several views
+        depth: standard deviation, mm, of the frame's translation along the lines, about 0, if all have one source or
+            are parallel; 0 for 20 mm"""
+        return Location(self, vertices, positions, _state(state, volume), noise, rigid, sources, depth)
 
     def warp(self, image: NDArray[Any], states: Union[str, Sequence[str]], *, step: ArrayLike = (1.0, 1.0, 1.0),
              origin: ArrayLike = (0.0, 0.0, 0.0), labels: bool = False, density: bool = False, since: str = "") -> Any:
@@ -605,21 +610,25 @@ class Location:
     distances: [n] distance of each point from its prediction by all other points, mm
     sigmas: [n] expected RMS of each distance, mm
     outliers: [n] True for outliers, which the result ignores
+    depth_error: standard deviation of the translation along one view, mm; 0 if several views or points fix it
     log_evidence: log likelihood, to compare results that differ only in the posture
     """
 
     def __init__(self, inside: Basis, vertices: Sequence[int], positions: ArrayLike, state: Any, noise: float,
-                 rigid: bool) -> None:
+                 rigid: bool, sources: Optional[ArrayLike] = None, depth: float = 0.0) -> None:
         places = np.asarray(positions, np.float64).reshape(-1, 3)
         count = len(places)
+        start = np.full((count, 3), np.nan) if sources is None else np.asarray(sources, np.float64).reshape(-1, 3)
+        if len(start) != count:
+            raise ValueError(f"the number of sources, {len(start)}, is not the number of positions, {count}")
         if len(vertices) != count:
             raise ValueError(f"the number of vertices, {len(vertices)}, is not the number of positions, {count}")
-        seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise)
-                                                  for v, p in zip(vertices, places, strict=True)))
+        seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise, not np.isnan(s).all(), tuple(s))
+                                                  for v, p, s in zip(vertices, places, start, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
         self._space = np.empty(_c.locate_space(count))  # memory that the C library uses in later calls
         self._c = ctypes.c_void_p()
-        task = _c.LocateTask(inside._c, count, seen, state, rigid)
+        task = _c.LocateTask(inside._c, count, seen, state, rigid, depth)
         _c.locate(task, residuals, self._space.ctypes.data, self._c)
         info = _c.location_info(self._c).contents
         findings = _c.Findings()
@@ -630,6 +639,7 @@ class Location:
         self.rotation: Doubles = np.array(info.rotation).reshape(3, 3)
         self.translation: Doubles = np.array(info.translation)
         self.log_evidence: float = info.log_evidence
+        self.depth_error: float = info.depth_error
         self.distances: Doubles = np.array([r.distance for r in residuals])
         self.sigmas: Doubles = np.array([r.sigma for r in residuals])
         self.outliers: NDArray[np.bool_] = np.array([r.outlier for r in residuals])

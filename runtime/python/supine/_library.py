@@ -164,13 +164,14 @@ class Breath(ctypes.Structure):
 
 class Observation(ctypes.Structure):
     """The C struct supine_observation."""
-    _fields_ = [("vertex", c_size_t), ("position", c_double * 3), ("noise", c_double)]
+    _fields_ = [("vertex", c_size_t), ("position", c_double * 3), ("noise", c_double), ("on_line", c_bool),
+                ("from_", c_double * 3)]
 
 
 class LocateTask(ctypes.Structure):
     """The C struct supine_locate_task."""
     _fields_ = [("inside", c_void_p), ("count", c_size_t), ("observed", POINTER(Observation)), ("state", State),
-                ("rigid", c_bool)]
+                ("rigid", c_bool), ("depth", c_double)]
 
 
 class LocationInfo(ctypes.Structure):
@@ -178,7 +179,7 @@ class LocationInfo(ctypes.Structure):
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
                 ("log_evidence", c_double), ("outlier_count", c_size_t), ("residual_expected", c_double),
-                ("turn", c_double)]
+                ("turn", c_double), ("depth_error", c_double)]
 
 
 class DoubtTask(ctypes.Structure):
