@@ -10,64 +10,8 @@ enum { ONE = 0, VOLUME = 1, PLACE = 4, VALUE = 7, TERMS = SUPINE_KRIGING_TERMS }
 const supine_kriging_model supine_kriging_default = {
     .sill = 6.0, .length = 90.0, .across = 1.0 / 3.0, .least = 2.0};
 
-bool supine_kriging_factor(size_t count, double *matrix) {
-  for (size_t i = 0; i < count; ++i) {
-    double *row = matrix + i * count;
-    for (size_t j = 0; j <= i; ++j) {
-      const double *other = matrix + j * count;
-      double sum = row[j];
-      for (size_t k = 0; k < j; ++k) {
-        sum -= row[k] * other[k];
-      }
-      if (i == j && !(sum > 0 && isfinite(sum))) {
-        return false;
-      }
-      row[j] = i == j ? sqrt(sum) : sum / other[j];
-    }
-  }
-  return true;
-}
-
-void supine_kriging_forward(size_t count, const double *factor, double *x) {
-  for (size_t i = 0; i < count; ++i) {
-    double sum = x[i];
-    for (size_t k = 0; k < i; ++k) {
-      sum -= factor[i * count + k] * x[k];
-    }
-    x[i] = sum / factor[i * count + i];
-  }
-}
-
-void supine_kriging_backward(size_t count, const double *factor, double *x) {
-  for (size_t i = count; i-- > 0;) {
-    x[i] /= factor[i * count + i];
-    for (size_t k = 0; k < i; ++k) {
-      x[k] -= factor[i * count + k] * x[i];
-    }
-  }
-}
-
 size_t supine_kriging_space(size_t count) {
   return count * (2 * count + SUPINE_KRIGING_COLUMNS + 3 + TERMS + 2);
-}
-
-int supine_kriging_column(size_t term, size_t axis, double *sign) {
-  *sign = 1;
-  if (term < 3) {
-    *sign = term == axis ? 1 : 0;
-    return ONE;
-  }
-  if (term == 3) {
-    return VOLUME + (int)axis;
-  }
-  const size_t about = term - 4;
-  *sign = 0;
-  if (axis == (about + 1) % 3) {
-    *sign = -1;
-  } else if (axis == (about + 2) % 3) {
-    *sign = 1;
-  }
-  return PLACE + (int)((6 - about - axis) % 3);
 }
 
 /* Compute the mean position of the points. Fill in supine_kriging.whitened: regressors and
@@ -335,76 +279,90 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
   return SUPINE_OK;
 }
 
-/* Compute the inverse covariance [3, 3] of the error of predicting one point from all others. It is
- * the block of this point in W - W X C X' W. X holds the regressors of the fitted terms, C is the
- * covariance of these terms. W is K^-1, with the covariance matrix K of the coordinates of all
- * points, less what is known of the positions along lines: W = K^-1 - K^-1 D (D' K^-1 D)^-1 D'
- * K^-1.
- * @param row  [count] column of L^-1 for this point, where K = L L' on each axis */
-static void leave_out_block(const supine_kriging *fit, const double *row, double block[9]) {
+enum { LEFT_MAX = 3 * SUPINE_KRIGING_LEFT_MAX }; /* coordinates that are left out together */
+
+/* Compute the inverse covariance of the errors of predicting points from all others: their block of
+ * W - W X C X' W. X holds the regressors of the fitted terms, C is the covariance of these terms. W
+ * is K^-1, with the covariance matrix K of the coordinates of all points, less what is unknown of
+ * the positions along lines: W = K^-1 - K^-1 D (D' K^-1 D)^-1 D' K^-1.
+ * @param rows   [left, count] columns of L^-1 for these points, where K = L L' on each axis
+ * @param seen   [left, 3, count] work space
+ * @param block  [3 left, 3 left] written */
+static void leave_out_block(const supine_kriging *fit, size_t left, const double *rows,
+                            double *seen, double *block) {
   const size_t n = fit->count;
-  double seen[3 * SUPINE_KRIGING_POINTS_MAX];
-  double terms[3][TERMS]; /* rows of X' W for the coordinates of the point */
-  if (fit->lines != NULL) {
-    double weights[SUPINE_KRIGING_POINTS_MAX];
-    memcpy(weights, row, n * sizeof *row);
-    supine_kriging_backward(n, fit->factor, weights);
-    supine_kriging_project_lines(fit, weights, seen);
-  }
-  for (size_t a = 0; a < 3; ++a) {
+  double terms[LEFT_MAX][TERMS]; /* rows of X' W for the coordinates of the points */
+  for (size_t i = 0; i < 3 * left; ++i) {
+    const double *row = rows + i / 3 * n;
+    if (fit->lines != NULL && i % 3 == 0) {
+      double weights[SUPINE_KRIGING_POINTS_MAX];
+      memcpy(weights, row, n * sizeof *row);
+      supine_kriging_backward(n, fit->factor, weights);
+      supine_kriging_project_lines(fit, weights, seen + i * n);
+    }
     for (size_t k = 0; k < TERMS; ++k) {
       double sign = 0;
-      const double *column = fit->whitened + (size_t)supine_kriging_column(k, a, &sign) * n;
-      terms[a][k] = sign * dot(n, row, column);
-      terms[a][k] -= fit->lines != NULL ? dot(n, fit->along + k * n, seen + a * n) : 0;
+      const double *column = fit->whitened + (size_t)supine_kriging_column(k, i % 3, &sign) * n;
+      terms[i][k] = sign * dot(n, row, column);
+      terms[i][k] -= fit->lines != NULL ? dot(n, fit->along + k * n, seen + i * n) : 0;
     }
   }
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t b = 0; b < 3; ++b) {
-      double sum = a == b ? dot(n, row, row) : 0;
-      sum -= fit->lines != NULL ? dot(n, seen + a * n, seen + b * n) : 0;
+  for (size_t i = 0; i < 3 * left; ++i) {
+    for (size_t j = 0; j < 3 * left; ++j) {
+      double sum = i % 3 == j % 3 ? dot(n, rows + i / 3 * n, rows + j / 3 * n) : 0;
+      sum -= fit->lines != NULL ? dot(n, seen + i * n, seen + j * n) : 0;
       for (size_t k = 0; k < TERMS; ++k) {
-        sum -= terms[a][k] * dot(TERMS, fit->covariance[k], terms[b]);
+        sum -= terms[i][k] * dot(TERMS, fit->covariance[k], terms[j]);
       }
-      block[3 * a + b] = sum;
+      block[i * 3 * left + j] = sum;
     }
   }
 }
 
-double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
-                                double *scratch) {
+size_t supine_kriging_scratch(size_t count) {
+  return 4 * (size_t)SUPINE_KRIGING_LEFT_MAX * count;
+}
+
+double supine_kriging_leave_out(const supine_kriging *fit, size_t left, const size_t *points,
+                                double residual[3], double *scratch) {
   const size_t n = fit->count;
-  const supine_kriging_point *p = &fit->points[point];
-  double block[9];
-  memset(scratch, 0, n * sizeof *scratch);
-  scratch[point] = 1;
-  supine_kriging_forward(n, fit->factor, scratch);
-  leave_out_block(fit, scratch, block);
-  const double scale = dot(n, scratch, scratch);
-  const double least = 1e-9 * scale;
-  if (p->on_line) { /* along its line, the block is 0 */
-    for (size_t k = 0; k < 9; ++k) {
-      block[k] += scale * p->direction[k / 3] * p->direction[k % 3];
+  const size_t size = 3 * left;
+  const supine_kriging_point *first = &fit->points[points[0]];
+  double block[LEFT_MAX * LEFT_MAX];
+  double solved[LEFT_MAX];
+  double least[LEFT_MAX];
+  memset(scratch, 0, left * n * sizeof *scratch);
+  memset(residual, 0, 3 * sizeof *residual);
+  for (size_t i = 0; i < left; ++i) {
+    scratch[i * n + points[i]] = 1;
+    supine_kriging_forward(n, fit->factor, scratch + i * n);
+  }
+  leave_out_block(fit, left, scratch, scratch + left * n, block);
+  for (size_t i = 0; i < size; ++i) {
+    const supine_kriging_point *p = &fit->points[points[i / 3]];
+    const double *row = scratch + i / 3 * n;
+    const double scale = dot(n, row, row);
+    least[i] = 1e-9 * scale;
+    solved[i] = dot(n, row, fit->weights + i % 3 * n);
+    for (size_t k = 0; k < 3; ++k) { /* along a line, the block is 0 */
+      block[i * size + i / 3 * 3 + k] += scale * p->direction[i % 3] * p->direction[k];
     }
   }
-  bool alone = !supine_kriging_factor(3, block);
-  for (size_t a = 0; a < 3; ++a) {
-    alone = alone || block[4 * a] * block[4 * a] < least;
-    residual[a] = dot(n, scratch, fit->weights + a * n);
+  bool alone = !supine_kriging_factor(size, block);
+  for (size_t i = 0; i < size; ++i) {
+    alone = alone || block[i * size + i] * block[i * size + i] < least[i];
   }
   if (alone) {
-    memset(residual, 0, 3 * sizeof *residual);
     return 0;
   }
-  double trace = 0;
-  double solved[3];
-  supine_kriging_forward(3, block, residual);
+  double trace = first->on_line ? -1e-9 / least[0] : 0;
+  supine_kriging_forward(size, block, solved);
   for (size_t k = 0; k < 3; ++k) {
-    double unit[3] = {k == 0, k == 1, k == 2};
-    supine_kriging_forward(3, block, unit);
-    trace += dot(3, unit, unit);
-    solved[k] = dot(3, unit, residual);
+    double unit[LEFT_MAX] = {0};
+    unit[k] = 1;
+    supine_kriging_forward(size, block, unit);
+    trace += dot(size, unit, unit);
+    residual[k] = dot(size, unit, solved);
   }
-  memcpy(residual, solved, sizeof solved);
-  return sqrt(fmax(0, trace - (p->on_line ? 1 / scale : 0)));
+  return sqrt(fmax(0, trace));
 }

@@ -39,7 +39,8 @@
 enum {
   SUPINE_KRIGING_POINTS_MAX = 300,
   SUPINE_KRIGING_TERMS = 7, /**< fitted numbers: 3 translation, 1 volume, 3 rotation */
-  SUPINE_KRIGING_COLUMNS = 10
+  SUPINE_KRIGING_COLUMNS = 10,
+  SUPINE_KRIGING_LEFT_MAX = 4 /**< views of one point that are left out together */
 };
 
 typedef struct supine_kriging_model {
@@ -62,7 +63,7 @@ typedef struct supine_kriging_point {
   double noise;       /**< standard deviation of the observed position on each axis, mm, above 0 */
   size_t lung;
   bool on_line;        /**< whether only the residual across `direction` was observed */
-  double direction[3]; /**< unit vector of the line */
+  double direction[3]; /**< unit vector of the line; 0 for a point */
 } supine_kriging_point;
 
 /** Options of a fit. A translation is always fitted. `volume` and `rotation` tell whether to fit a
@@ -180,13 +181,18 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
                                  const supine_kriging_point *points, double *space,
                                  supine_kriging *fit, supine_error *error);
 
-/** Predict the residual of an observed point from all other points.
+/** Return the number of doubles of work space that supine_kriging_leave_out needs. */
+size_t supine_kriging_scratch(size_t count);
+
+/** Predict the residual of an observed point from others.
+ * @param left      number of points to leave out, 1 to SUPINE_KRIGING_LEFT_MAX
+ * @param points    [left] their indices; the first one is predicted
  * @param residual  [3] residual minus its prediction, mm, written
- * @param scratch   [count] work space
+ * @param scratch   [supine_kriging_scratch(count)] work space
  * @return expected RMS length of this difference, mm; 0 if no prediction is possible. Across the
  *   line, for a point on a line */
-double supine_kriging_leave_out(const supine_kriging *fit, size_t point, double residual[3],
-                                double *scratch);
+double supine_kriging_leave_out(const supine_kriging *fit, size_t left, const size_t *points,
+                                double residual[3], double *scratch);
 
 /** Points of one lung at which to predict. */
 typedef struct supine_kriging_target {

@@ -56,8 +56,9 @@ typedef struct workspace {
   supine_kriging_point *points; /* [task->count] observed points */
   double *law;                  /* [task->count, 3] predicted positions before correction, mm */
   double *kriging; /* [supine_kriging_space(task->count)] work space of supine_kriging_fit */
-  double *scratch; /* [task->count] work space of supine_kriging_leave_out */
-  double *seen;    /* [task->count, 3] observed positions; on a line, near the prediction, mm */
+  double
+      *scratch; /* [supine_kriging_scratch(task->count)] work space of supine_kriging_leave_out */
+  double *seen; /* [task->count, 3] observed positions; on a line, near the prediction, mm */
 } workspace;
 
 static size_t doubles_of(size_t bytes) {
@@ -66,7 +67,7 @@ static size_t doubles_of(size_t bytes) {
 
 size_t supine_locate_space(size_t count) {
   return doubles_of(sizeof(supine_location)) + doubles_of(count * sizeof(supine_kriging_point)) +
-         7 * count + supine_kriging_space(count);
+         6 * count + supine_kriging_scratch(count) + supine_kriging_space(count);
 }
 
 static void place_in(double *space, size_t count, workspace *s) {
@@ -76,9 +77,9 @@ static void place_in(double *space, size_t count, workspace *s) {
   s->points = (supine_kriging_point *)space;
   space += doubles_of(count * sizeof *s->points);
   s->law = space;
-  s->scratch = space + 3 * count;
-  s->seen = space + 4 * count;
-  s->kriging = space + 7 * count;
+  s->seen = space + 3 * count;
+  s->kriging = space + 6 * count;
+  s->scratch = s->kriging + supine_kriging_space(count);
 }
 
 static supine_status check(const supine_locate_task *task, supine_error *error) {
@@ -409,8 +410,39 @@ static supine_status iterate(workspace *s, supine_error *error) {
   }
 }
 
-/* Compare each observed point with its prediction by all other points. Return the index of the
- * worst new outlier, or the number of points if there is none. */
+/* Compare an observation with its prediction by all others but `left - 1` ones. */
+static supine_locate_residual compare(workspace *s, size_t left, const size_t *points) {
+  const size_t j = points[0];
+  const double noise = s->task->observed[j].noise;
+  const double axes = s->points[j].on_line ? 2 : 3; /* along which the distance counts */
+  const double extra = s->points[j].noise * s->points[j].noise - noise * noise;
+  double d[3];
+  const double sigma = supine_kriging_leave_out(&s->fit->kriging, left, points, d, s->scratch);
+  return (supine_locate_residual){.distance = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]),
+                                  .sigma = sqrt(fmax(0, sigma * sigma - axes * extra))};
+}
+
+static double ratio_of(const supine_locate_residual *r) {
+  return r->sigma > 0 ? r->distance / r->sigma : 1;
+}
+
+/* List observation j and others of its vertex, at most SUPINE_KRIGING_LEFT_MAX. Return how many. */
+static size_t list_views(const workspace *s, size_t j, size_t *views) {
+  const supine_observation *observed = s->task->observed;
+  size_t count = 1;
+  views[0] = j;
+  for (size_t k = 0; k < s->task->count && count < SUPINE_KRIGING_LEFT_MAX; ++k) {
+    if (k != j && observed[k].vertex == observed[j].vertex) {
+      views[count++] = k;
+    }
+  }
+  return count;
+}
+
+/* Compare each observed point with its prediction by all other points. Views of one point are left
+ * out together, and count as one point; each is compared with the other views, too, to find an
+ * outlier. Return the index of the worst new outlier, or the number of observations if there is
+ * none. */
 static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   const size_t n = s->task->count;
   size_t worst = n;
@@ -419,35 +451,36 @@ static size_t find_worst(workspace *s, supine_locate_residual *residuals) {
   double expected = 0;
   double noises = 0;
   double ratios = 0;
-  size_t used = 0;
+  double used = 0;
   for (size_t j = 0; j < n; ++j) {
     supine_locate_residual *r = &residuals[j];
-    double d[3];
-    const double noise = s->task->observed[j].noise;
-    const double axes = s->points[j].on_line ? 2 : 3; /* along which the distance counts */
-    const double extra = s->points[j].noise * s->points[j].noise - noise * noise;
-    r->sigma = supine_kriging_leave_out(&s->fit->kriging, j, d, s->scratch);
-    r->sigma = sqrt(fmax(0, r->sigma * r->sigma - axes * extra));
-    r->distance = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    if (r->outlier) {
+    const bool outlier = r->outlier;
+    size_t views[SUPINE_KRIGING_LEFT_MAX];
+    const size_t count = list_views(s, j, views);
+    const double share = 1 / (double)count;
+    const supine_locate_residual apart = compare(s, count, views);
+    const supine_locate_residual viewed = count > 1 ? compare(s, 1, views) : apart;
+    const bool differs = ratio_of(&viewed) > fmax(ratio_of(&apart), outlier_limit);
+    *r = differs ? viewed : apart;
+    r->outlier = outlier;
+    if (outlier) {
       continue;
     }
-    sum += r->distance * r->distance;
-    expected += r->sigma * r->sigma;
-    noises += axes * noise * noise;
-    ++used;
-    const double ratio = r->sigma > 0 ? r->distance / r->sigma : 1;
-    ratios += ratio * ratio;
-    if (ratio > largest) {
-      largest = ratio;
+    sum += share * apart.distance * apart.distance;
+    expected += share * apart.sigma * apart.sigma;
+    noises += share * (s->points[j].on_line ? 2 : 3) * pow(s->task->observed[j].noise, 2);
+    used += share;
+    ratios += share * pow(ratio_of(&apart), 2);
+    if (ratio_of(r) > largest) {
+      largest = ratio_of(r);
       worst = j;
     }
   }
-  s->fit->factor = sqrt((prior_points + ratios) / (prior_points + (double)used));
-  s->found->residual_rms = used > 0 ? sqrt(sum / (double)used) : 0;
-  s->found->residual_expected = used > 0 ? sqrt(expected / (double)used) : 0;
+  s->fit->factor = sqrt((prior_points + ratios) / (prior_points + used));
+  s->found->residual_rms = used > 0 ? sqrt(sum / used) : 0;
+  s->found->residual_expected = used > 0 ? sqrt(expected / used) : 0;
   s->fit->excess =
-      used > 0 ? fmax(0, (sum - noises - excess_from * (expected - noises)) / (double)used) : 0;
+      used > 0 ? fmax(0, (sum - noises - excess_from * (expected - noises)) / used) : 0;
   return worst;
 }
 

@@ -183,8 +183,8 @@ static void predict(const person *p, const size_t *drawn, size_t count, double p
   }
   for (size_t j = 0; j < count; ++j) {
     double left[3];
-    double scratch[DRAWN];
-    const double sigma = supine_kriging_leave_out(&fit, j, left, scratch);
+    double scratch[4 * SUPINE_KRIGING_LEFT_MAX * DRAWN];
+    const double sigma = supine_kriging_leave_out(&fit, 1, &j, left, scratch);
     s->left_out += length(left) > 3.0 * sigma;
     s->observed += 1;
   }

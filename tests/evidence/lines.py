@@ -3,9 +3,9 @@
 
     lines.py PROGRAM DATA       DATA: folder with caseNN_insp.nii.gz, caseNN_exp.nii.gz and caseNN.csv (DIR-Lab)
 
-Each basis is made of the inhaled scan by the default law and posed at the volume of the exhaled scan. Ten landmarks of the
-exhaled scan, drawn three times for each person, are observed with 1 mm of noise on each axis: in space, or across the
-lines from a source 700 mm in front of the lungs, in one view or in two that are 30 degrees apart. Their frame is
+Each basis is made of the inhaled scan by the default law and posed at the volume of the exhaled scan. Ten landmarks of
+the exhaled scan, drawn three times for each person, are observed with 1 mm of noise on each axis: in space, or across
+the lines from a source 700 mm in front of the lungs, in one view or in two that are 30 degrees apart. Their frame is
 translated by 5 mm on each axis at random. The others are the truth."""
 import csv
 import glob
@@ -35,7 +35,7 @@ def read(path, count):
 
 
 def observe(path, kind, seen, truth, random):
-    """Write the file of observations; return the noise of none."""
+    """Write the file of observations."""
     middle = truth.mean(0)
     angles = {"two views": (-np.pi / 12, np.pi / 12), "in space": ()}.get(kind, (0.0,))
     with open(path, "w", encoding="utf-8") as file:

@@ -110,8 +110,8 @@ TEST(test_kriging_leave_out_equals_fit_without_the_point) {
     supine_kriging without;
     assert_int_equal(supine_kriging_fit(&unknown, SEEN, points, space, &fit, NULL), SUPINE_OK);
     double left[3];
-    double scratch[SEEN];
-    const double sigma = supine_kriging_leave_out(&fit, SEEN - 1, left, scratch);
+    double scratch[16 * SEEN];
+    const double sigma = supine_kriging_leave_out(&fit, 1, &(size_t){SEEN - 1}, left, scratch);
     assert_int_equal(supine_kriging_fit(&unknown, SEEN - 1, points, other_space, &without, NULL),
                      SUPINE_OK);
     float shift[3];
@@ -181,7 +181,8 @@ TEST(test_kriging_three_lines_at_right_angles_equal_a_point) {
   free(other_space);
 }
 
-/* What a fit says of a line that it leaves out is what a fit without the line says across it. */
+/* What a fit says of a line that it leaves out, with up to two other points, is what a fit without
+ * them says across it. */
 TEST(test_kriging_leave_out_line_equals_fit_without_the_line) {
   uint64_t seed = 31;
   supine_kriging_point points[SEEN];
@@ -198,23 +199,26 @@ TEST(test_kriging_leave_out_line_equals_fit_without_the_line) {
   supine_kriging fit;
   supine_kriging without;
   double left[3];
-  double scratch[SEEN];
+  double scratch[16 * SEEN];
   assert_int_equal(supine_kriging_fit(&options, SEEN, points, space, &fit, NULL), SUPINE_OK);
-  const double sigma = supine_kriging_leave_out(&fit, SEEN - 1, left, scratch);
-  assert_int_equal(supine_kriging_fit(&options, SEEN - 1, points, other_space, &without, NULL),
-                   SUPINE_OK);
-  const supine_kriging_point *p = &points[SEEN - 1];
-  float shift[3];
-  float variance = 0;
-  double along = 0;
-  predict(&without, p, shift, &variance);
-  for (size_t i = 0; i < 3; ++i) {
-    along += p->direction[i] * (p->residual[i] - (double)shift[i]);
-  }
-  assert_true(sigma * sigma < (double)variance + 2 && sigma > 1);
-  for (size_t i = 0; i < 3; ++i) {
-    const double across = p->residual[i] - (double)shift[i] - along * p->direction[i];
-    assert_true(fabs(left[i] - across) < 2e-3);
+  for (size_t out = 1; out < 4; ++out) {
+    const double sigma = supine_kriging_leave_out(
+        &fit, out, (size_t[]){SEEN - 1, SEEN - 2, SEEN - 3}, left, scratch);
+    assert_int_equal(supine_kriging_fit(&options, SEEN - out, points, other_space, &without, NULL),
+                     SUPINE_OK);
+    const supine_kriging_point *p = &points[SEEN - 1];
+    float shift[3];
+    float variance = 0;
+    double along = 0;
+    predict(&without, p, shift, &variance);
+    for (size_t i = 0; i < 3; ++i) {
+      along += p->direction[i] * (p->residual[i] - (double)shift[i]);
+    }
+    assert_true(sigma * sigma < (double)variance + 2 && sigma > 1);
+    for (size_t i = 0; i < 3; ++i) {
+      const double across = p->residual[i] - (double)shift[i] - along * p->direction[i];
+      assert_true(fabs(left[i] - across) < 2e-3);
+    }
   }
   free(space);
   free(other_space);
@@ -292,11 +296,11 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
     float shift[3];
     float variance = 0;
     double left[3];
-    double scratch[12];
+    double scratch[16 * 12];
     predict(&fit, &points[0], shift, &variance);
     assert_true(isfinite((double)shift[0]) && variance > 0);
     assert_true(variance <= 3.01F); /* sum over 3 axes of an observation's variance, 1 mm^2 */
-    assert_int_equal(supine_kriging_leave_out(&fit, 0, left, scratch) > 0, count > 1);
+    assert_int_equal(supine_kriging_leave_out(&fit, 1, &(size_t){0}, left, scratch) > 0, count > 1);
   }
   points[1].noise = points[0].noise = 0;
   supine_kriging fit;
