@@ -97,9 +97,9 @@ static supine_status read_source(const reading *r, supine_csv *csv, const double
   for (size_t k = 0; k < 3; ++k) {
     SUPINE_TRY(supine_csv_number(csv, FROM + k, columns[FROM + k], &from[k], r->error));
   }
+  const double length = hypot(hypot(at[0] - from[0], at[1] - from[1]), at[2] - from[2]);
   SUPINE_REFUSE_IF(
-      hypot(hypot(at[0] - from[0], at[1] - from[1]), at[2] - from[2]) < 1e-6, r->error,
-      SUPINE_ERROR_FORMAT,
+      length < 1e-6, r->error, SUPINE_ERROR_FORMAT,
       "%s:%zu: the line of sight ends where it begins: give in x,y,z another place on it "
       "than in from_x,from_y,from_z",
       r->path, csv->line);
