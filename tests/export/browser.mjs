@@ -117,11 +117,11 @@ export async function press(page, key) {
   await page.keyboard.press(key);
 }
 
-/** Return the picture without the texts over it. */
+/** Return the picture without the texts and, on a small screen, the cards over it. */
 const screenshot = (page) =>
   page
     .locator('#picture')
-    .screenshot({ style: '#stage > :not(#picture):not(#notes) { visibility: hidden !important }' });
+    .screenshot({ style: '#cards, #stage > :not(#picture):not(#notes) { visibility: hidden !important }' });
 
 /** Return the picture after it has been drawn and no longer changes. */
 export async function picture(page) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Test the page at four sizes in two themes: nothing is cut off, cards do not move when another posture
+// Test the page at five sizes in two themes: nothing is cut off, cards do not move when another posture
 // is chosen, and a tap marks a point. Pictures are kept in the folder
 // tests/page_sizes of the build folder.
 import assert from 'node:assert/strict';
@@ -14,6 +14,7 @@ const pictures = pictureFolder('page_sizes');
 for (const [width, height] of [
   [1400, 900],
   [900, 600],
+  [2560, 1440],
   [844, 390],
   [390, 844],
 ]) {
@@ -46,7 +47,7 @@ for (const [width, height] of [
   for (const key of ['1', '4', '5', '3']) {
     await press(page, key);
     await settled(page);
-    const { y, height: tall } = await page.locator('#postures').boundingBox();
+    const { y, height: tall } = await page.locator('#cards').boundingBox();
     assert.ok(
       !cards || (Math.abs(y - cards.y) < 60 && tall === cards.tall),
       `${width} x ${height}, posture ${key}: the cards move`,

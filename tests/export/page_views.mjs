@@ -182,10 +182,11 @@ async function checkSides(page) {
 
 /** Check that marked points move with the tissue and measure distances, and that a link restores them. */
 async function checkProbes(page) {
+  await page.evaluate(() => window.scrollTo(0, 0));
   const box = await page.locator('#picture').boundingBox();
   for (const [x, y] of [
-    [0.38, 0.5],
-    [0.62, 0.55],
+    [0.41, 0.5],
+    [0.59, 0.55],
   ]) {
     const had = await page.evaluate(() => window.supine.state.probes.length);
     await page.mouse.click(box.x + box.width * x, box.y + box.height * y);

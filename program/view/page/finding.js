@@ -207,21 +207,27 @@ function sentenceOf(basis, moved, target, gravity, above) {
 const errorName = ({ fitErrors }) => (fitErrors ? 'error of the fit to the simulator' : 'expected error');
 const errorText = (mm) => (mm < 0.05 ? 'below 0.05 mm' : `${mm < 3 ? mm.toFixed(1) : mm.toFixed(0)} mm`);
 
+/** Return a text as parts in which no number is broken from its unit. */
+const unbroken = (text) =>
+  text.split(/(\d[\d.]* (?:mm|mL))/).map((words, i) => {
+    if (i % 2 === 0) return words;
+    return Object.assign(document.createElement('span'), { className: 'whole', textContent: words });
+  });
+
 /** Write a sentence of sentenceOf to an element, with its parts emphasised or toned down. */
 function writeSentence(element, sentence) {
   const text = ['before', 'told', 'after', 'error'].map((key) => sentence[key]).join('');
   if (element.written === text) return;
   element.written = text;
   element.replaceChildren(
-    sentence.before,
+    ...unbroken(sentence.before),
     ...[
       ['em', sentence.told],
-      ['', sentence.after],
+      ['span', sentence.after],
       ['small', sentence.error],
     ].map(([tag, words]) => {
-      if (!tag) return words;
       const part = document.createElement(tag);
-      part.textContent = words;
+      part.append(...unbroken(words));
       return part;
     }),
   );

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: MIT
 // Draw the notes that belong to the state of the page: gravity, targets, probes, and names of two postures.
 
-/** Draw the notes over the picture. */
+const NOTES_WIDE = 1300; // CSS pixels; on a wider picture notes grow with it
+
+/** Draw the notes over the picture. Their unit is a CSS pixel, times `grown` on a wide picture. */
 function drawNotes() {
-  const { width, height } = sizeOf(notes.canvas);
+  const size = sizeOf(notes.canvas);
+  const grown = Math.max(1, size.width / NOTES_WIDE);
+  const [width, height] = [size.width / grown, size.height / grown];
+  const unit = ratio() * grown;
   const pane = panes.at(-1);
   notes.context = freshContext(notes.canvas);
+  notes.context.scale(grown, grown);
   notes.taken = [];
   const small = width < 520;
   const [x, y] = [small ? 34 : width - 44, height - (small ? 100 : 92)];
-  notes.gravity(pane, x, y);
+  notes.gravity(pane, x, y, width);
   notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
   if (inside && state.inside && state.moment && !state.turning) {
     const between = targetsBetween(inside, state.moment, originMoment());
@@ -20,9 +26,9 @@ function drawNotes() {
       const target = between[part];
       const large = anatomyColour(inside, part);
       if (part === state.chosen && target.mm > 0.05 && !large)
-        notes.lens(pane, target, radii[part], originName(), ratio(), { width, height });
+        notes.lens(pane, target, radii[part], originName(), unit, { width, height, grown });
       else {
-        const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio()));
+        const [was, at] = [target.was, target.at].map((p) => project(pane, p, unit));
         if (!was || !at) continue;
         notes.context.strokeStyle = notes.context.fillStyle = css('--ink');
         notes.context.lineWidth = 1.5;
@@ -34,7 +40,7 @@ function drawNotes() {
     }
   }
   state.probes.forEach((vertex, i) => {
-    const at = project(pane, placeOf(basis, state.moment, vertex), ratio());
+    const at = project(pane, placeOf(basis, state.moment, vertex), unit);
     if (at) notes.text(`\u25cf ${i + 1}`, ...at, { font: '700 13px' });
   });
   if (state.beside)

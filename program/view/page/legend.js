@@ -22,7 +22,7 @@ function showState() {
     (pressed) => {
       buttons.forEach(({ button }, i) => button.setAttribute('aria-pressed', String(i === pressed)));
       // Where the cards are in one row that scrolls
-      if (pressed >= 0) $('postures').scrollLeft = buttons[pressed].button.offsetLeft - $('postures').offsetLeft - 104;
+      if (pressed >= 0) $('cards').scrollLeft = buttons[pressed].button.offsetLeft - $('cards').offsetLeft - 104;
     },
   );
   write(

@@ -2,8 +2,8 @@
 // Draw notes over the picture on a 2-D canvas: gravity, the traces and names of targets, a lens that enlarges the trace
 // of the chosen one, and marked points.
 
-/** Return the position on the canvas, CSS pixels, of a point in the patient's axes, mm; null if it is behind the
- * viewer. `ratio` is the number of pixels of the canvas for each CSS pixel. */
+/** Return the position on the canvas, units of notes, of a point in the patient's axes, mm; null if it is behind the
+ * viewer. `ratio` is the number of pixels of the canvas for each unit. */
 function project(pane, [x, y, z], ratio) {
   const m = pane.toEye;
   const eye = [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
@@ -67,8 +67,7 @@ function drawTrace(context, was, at, radius, halo) {
     drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
 }
 
-/** The canvas with the notes. `taken` has the boxes [left, top, right, bottom], CSS pixels, that names may not cover.
- * */
+/** The canvas with the notes. `taken` has the boxes [left, top, right, bottom] that names may not cover. */
 class Notes {
   constructor(canvas) {
     this.canvas = canvas;
@@ -89,9 +88,9 @@ class Notes {
     context.fillText(words, x, y);
   }
 
-  /** Draw gravity as an arrow from the upper end of a line at (x, y), 90 pixels long if it is in the plane of the
+  /** Draw gravity as an arrow around (x, y) in a picture of this width, 80 units long if it is in the plane of the
    * picture. */
-  gravity(pane, x, y) {
+  gravity(pane, x, y, width) {
     const { context } = this;
     const [gx, gy] = rotate(pane.turn, pane.gravity);
     const size = Math.hypot(gx, gy);
@@ -104,7 +103,7 @@ class Notes {
       const words = `gravity, ${rotate(pane.turn, pane.gravity)[2] > 0 ? 'towards you' : 'away from you'}`;
       context.font = '12px system-ui, sans-serif';
       const half = context.measureText(words).width / 2 + 10; // with a margin to the edge of the picture
-      this.text(words, Math.max(half, Math.min(this.canvas.clientWidth - half, x)), y - 16, {
+      this.text(words, Math.max(half, Math.min(width - half, x)), y - 16, {
         align: 'center',
         font: '12px',
       });
@@ -155,12 +154,12 @@ class Notes {
   }
 
   /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside it or, if the
-   * picture is narrow, its name below. */
-  lens(pane, target, radius, from, ratio, { width, height }) {
+   * picture is narrow, its name and distance below. */
+  lens(pane, target, radius, from, ratio, { width, height, grown: unit }) {
     const { context, taken } = this;
     const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
     if (!was || !at) return;
-    const scale = 1 / pane.pixel; // CSS pixels for each mm
+    const scale = 1 / (pane.pixel * unit); // units for each mm
     const narrow = width < 720;
     const size = Math.min(92, height * 0.2, width * 0.15);
     const middle = [width - size - (narrow ? 10 : 172), size + 12];
@@ -190,18 +189,19 @@ class Notes {
     const [old, now] = [was, at].map((p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown));
     drawTrace(context, old, now, radius * grown, error * grown);
     context.restore();
-    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 22 : 6)]);
+    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 38 : 6)]);
     if (narrow) {
       this.text(shortName(target.name), width - 10, middle[1] + size + 12, {
         align: 'right',
         colour: '--change',
         font: '600 12px',
       });
+      this.text(`${target.mm.toFixed(1)} mm`, width - 10, middle[1] + size + 28, { align: 'right', font: '600 12px' });
       return;
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
     const lines = [
-      [shortName(target.name, 17), '--change', '650 14px'],
+      [shortName(target.name, 15), '--change', '650 14px'],
       [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'],
       ...ways.map((way) => [way, '--ink', '12px']),
       [`dashed: ${from}`, '--soft', '12px'],
