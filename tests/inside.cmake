@@ -3,6 +3,7 @@ supine_test(precompute/inside supine_inside supine_lungs)
 supine_test(mesh/image supine_image)
 supine_test(mesh/labels supine_labels supine_image supine_inside supine_lungs m)
 supine_test(precompute/field supine_inside supine_warp supine_lungs)
+supine_test(precompute/compact supine_inside supine_warp supine_lungs)
 set_tests_properties(image labels PROPERTIES
   ENVIRONMENT "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/lsan.supp:print_suppressions=0")
 

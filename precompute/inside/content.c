@@ -7,6 +7,7 @@
 #include "base/text.h"
 
 #include "mesh/io/points.h"
+#include "mesh/compact.h"
 #include "precompute/inside/content.h"
 
 /* Make room for more points, triangles and bytes of names. */
@@ -104,12 +105,42 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
   return add_surface(name, length, &mesh, content, error);
 }
 
+/* Make the list of rigid parts, unless it exists. */
+static supine_status list_rigid(supine_inside_content *content, supine_error *error) {
+  if (content->rigid == NULL) {
+    content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
+  }
+  return content->rigid == NULL ? supine_error_memory(error, "%zu parts", content->part_count)
+                                : SUPINE_OK;
+}
+
+supine_status supine_inside_content_find_compact(supine_inside_content *content,
+                                                 supine_error *error) {
+  size_t first = 0; /* triangle; those of a part follow each other */
+  while (first < content->triangle_count) {
+    const uint32_t part = content->part[content->triangles[3 * first]];
+    size_t next = first;
+    double volume = 0.0;
+    double covariance[3][3];
+    while (next < content->triangle_count &&
+           content->part[content->triangles[3 * next]] == part) {
+      ++next;
+    }
+    const supine_mesh mesh = {content->count, content->points, next - first,
+                              content->triangles + 3 * first};
+    SUPINE_TRY(supine_mesh_solid(&mesh, &volume, covariance));
+    if (supine_mesh_is_compact(volume, (const double(*)[3])covariance)) {
+      SUPINE_TRY(list_rigid(content, error));
+      content->rigid[part] = true;
+    }
+    first = next;
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error) {
-  content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
-  if (content->rigid == NULL) {
-    return supine_error_memory(error, "%zu parts", content->part_count);
-  }
+  SUPINE_TRY(list_rigid(content, error));
   for (const char *at = names;; ++at) {
     const size_t length = strcspn(at, ",");
     const char *part = content->names;

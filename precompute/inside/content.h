@@ -33,7 +33,11 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
 
-/** Mark parts as rigid: they move, but keep their shape.
+/** Mark the closed meshes that are compact as rigid (supine_mesh_is_compact). */
+supine_status supine_inside_content_find_compact(supine_inside_content *content,
+                                                 supine_error *error);
+
+/** Mark further parts as rigid: they move, but keep their shape.
  * @param names  part names separated by commas, or "all" */
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);

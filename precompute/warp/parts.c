@@ -7,22 +7,12 @@
 #include "base/arena.h"
 #include "base/vec3.h"
 
+#include "mesh/compact.h"
 #include "precompute/warp/tissue.h"
 
 /* Radius of the ball that must fit into a part, mm. Vessels beyond the hila have radii below 3 mm,
  * and slivers of the chest wall within the lungs' surface are thinner than 6 mm. */
 static const double opening = 3.0;
-/* Limits of a part's volume, mL. A ball of 1 mL has a radius of 6 mm: smaller ones span hardly more
- * than a cell of the field, and their loss of volume is below its error. Over 30 mL (a radius of 19
- * mm) are consolidation and collapse, which follow the lung around them. */
-static const double volume_least = 1.0;
-static const double volume_most = 30.0;
-/* Least ratio of the smallest and the largest SD along the principal axes, and the least share of
- * the ellipsoid of these SDs that a part fills. In trials with synthetic trees of vessels, these
- * filled 0.15 to 0.55; a solid ellipsoid fills 1. */
-static const double slender = 1.0 / 3.0;
-static const double filled = 0.7;
-
 /* Largest number of points that stand for the surface of a part: 1.5 mm apart at 30 mL. */
 enum { OUTLINE = 2000 };
 
@@ -30,6 +20,8 @@ typedef struct search {
   const supine_image *frame; /* size and frame of the voxels */
   unsigned char *stage;      /* [voxels] stage of the search in the upper bits */
   bool named;                /* whether every component is a part, whatever its shape */
+  const supine_image *labels; /* a component has voxels of one label; NULL if it has open voxels */
+  double label;
   size_t *list;              /* the voxels of the component */
   size_t count, room;
   supine_tissue *tissue;
@@ -127,10 +119,18 @@ static supine_status open_by_ball(const search *s, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Append a voxel to the component if it is open, and mark it as seen. */
+/* Return whether a voxel belongs to the component, and is not in its list yet. */
+static bool belongs(const search *s, size_t voxel) {
+  if (s->labels != NULL) {
+    return has_stage(s->stage[voxel], 0) && supine_image_get(s->labels, voxel) == s->label;
+  }
+  return has_stage(s->stage[voxel], SUPINE_TISSUE_CORE) ||
+         has_stage(s->stage[voxel], SUPINE_TISSUE_OPEN);
+}
+
+/* Append a voxel to the component if it belongs to it, and mark it as seen. */
 static bool take(search *s, size_t voxel) {
-  if (!has_stage(s->stage[voxel], SUPINE_TISSUE_CORE) &&
-      !has_stage(s->stage[voxel], SUPINE_TISSUE_OPEN)) {
+  if (!belongs(s, voxel)) {
     return true;
   }
   if (s->count == s->room) {
@@ -146,7 +146,7 @@ static bool take(search *s, size_t voxel) {
   return true;
 }
 
-/* Find the component of open voxels that contains a voxel; neighbours share a face. */
+/* Find the component that contains a voxel; neighbours share a face. */
 static bool find_component(search *s, size_t voxel) {
   const size_t *size = s->frame->size;
   s->count = 0;
@@ -166,59 +166,6 @@ static bool find_component(search *s, size_t voxel) {
     }
   }
   return good;
-}
-
-/* Compute the eigenvalues of a symmetric matrix [Smith 1961, Commun ACM 4(4), 168], largest first.
- */
-static void eigenvalues(const double m[3][3], double value[3]) {
-  const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3.0;
-  double square = 0.0;
-  double rest[3][3];
-  for (size_t k = 0; k < 9; ++k) {
-    rest[k / 3][k % 3] = m[k / 3][k % 3] - (k / 3 == k % 3 ? mean : 0.0);
-    square += rest[k / 3][k % 3] * rest[k / 3][k % 3];
-  }
-  const double p = sqrt(square / 6.0);
-  double cosine = 1.0;
-  if (p > 0.0) {
-    cosine = 0.5 * supine_triple(rest[0], rest[1], rest[2]) / (p * p * p);
-  }
-  const double angle = acos(fmin(fmax(cosine, -1.0), 1.0)) / 3.0;
-  for (size_t k = 0; k < 3; ++k) {
-    value[k] = mean + 2.0 * p * cos(angle - 2.0943951023931953 * (double)k); /* 2 pi / 3 */
-  }
-}
-
-/* Measure the component: volume, centre, and whether its shape is compact. */
-static bool measure(const search *s, supine_warp_part *part) {
-  double square[3][3] = {{0.0}};
-  double value[3];
-  double at[3];
-  const double n = (double)s->count;
-  for (size_t i = 0; i < s->count; ++i) {
-    supine_image_place(s->frame, s->list[i], at);
-    for (size_t k = 0; k < 3; ++k) {
-      part->centre[k] += at[k] / n;
-    }
-  }
-  for (size_t i = 0; i < s->count; ++i) {
-    supine_image_place(s->frame, s->list[i], at);
-    supine_subtract(at, part->centre, at);
-    for (size_t k = 0; k < 9; ++k) {
-      square[k / 3][k % 3] += at[k / 3] * at[k % 3] / n;
-    }
-    part->reach = fmax(part->reach, supine_length(at));
-  }
-  part->count = s->count;
-  part->volume = n * supine_warp_tissue_voxel(s->frame);
-  part->radius = cbrt(1e3 * part->volume * 0.2387324146378430); /* 3 / (4 pi) */
-  eigenvalues((const double(*)[3])square, value);
-  /* A solid ellipsoid has the semi-axes sqrt(5) SD. */
-  const double sd[3] = {sqrt(value[0]), sqrt(fmax(value[1], 0.0)), sqrt(fmax(value[2], 0.0))};
-  const double least = fmin(sd[1], sd[2]);
-  const double ellipsoid = 4.1887902047863905e-3 * pow(5.0, 1.5) * sd[0] * sd[1] * sd[2];
-  return s->named || (part->volume <= volume_most && least >= slender * sd[0] &&
-                      part->volume >= filled * ellipsoid);
 }
 
 /* Store the component as a mask on the voxels around it. */
@@ -296,23 +243,121 @@ static bool make_outline(supine_warp_part *part) {
   return true;
 }
 
+/* Mark with 2 the empty voxels of a mask that are connected to its border. Return false if out of
+ * memory. */
+static bool mark_outside(const supine_image *mask) {
+  unsigned char *in = mask->values;
+  const size_t *size = mask->size;
+  const size_t count = size[0] * size[1] * size[2];
+  SUPINE_ARENA arena = {0};
+  size_t *list = supine_arena_take(&arena, count, sizeof *list);
+  size_t found = 0;
+  if (list == NULL) {
+    return false;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at[3] = {i % size[0], i / size[0] % size[1], i / size[0] / size[1]};
+    bool border = false;
+    for (size_t a = 0; a < 3; ++a) {
+      border = border || at[a] == 0 || at[a] + 1 == size[a];
+    }
+    if (border && in[i] == 0) {
+      in[i] = 2;
+      list[found++] = i;
+    }
+  }
+  for (size_t n = 0; n < found; ++n) {
+    size_t stride = 1;
+    size_t rest = list[n];
+    for (size_t a = 0; a < 3; ++a) {
+      const size_t sides[2] = {list[n] - stride, list[n] + stride};
+      const bool inside[2] = {rest % size[a] > 0, rest % size[a] + 1 < size[a]};
+      for (size_t side = 0; side < 2; ++side) {
+        if (inside[side] && in[sides[side]] == 0) {
+          in[sides[side]] = 2;
+          list[found++] = sides[side];
+        }
+      }
+      rest /= size[a];
+      stride *= size[a];
+    }
+  }
+  return true;
+}
+
+/* Fill the cavities of a mask: a tumour keeps its cavity. Return false if out of memory. */
+static bool fill_cavities(supine_image *mask) {
+  unsigned char *in = mask->values;
+  if (!mark_outside(mask)) {
+    return false;
+  }
+  for (size_t i = 0; i < mask->size[0] * mask->size[1] * mask->size[2]; ++i) {
+    in[i] = in[i] == 2 ? 0 : 1;
+  }
+  return true;
+}
+
+/* Measure a part from its mask: volume, centre and reach; return whether it is compact. */
+static bool measure(supine_warp_part *part) {
+  const supine_image *mask = &part->mask;
+  const unsigned char *in = mask->values;
+  const size_t count = mask->size[0] * mask->size[1] * mask->size[2];
+  double square[3][3] = {{0.0}};
+  double at[3];
+  for (size_t i = 0; i < count; ++i) {
+    if (in[i] == 1) {
+      supine_image_place(mask, i, at);
+      ++part->count;
+      for (size_t k = 0; k < 3; ++k) {
+        part->centre[k] += at[k];
+      }
+    }
+  }
+  const double n = (double)part->count;
+  for (size_t k = 0; k < 3; ++k) {
+    part->centre[k] /= n;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    if (in[i] == 1) {
+      supine_image_place(mask, i, at);
+      supine_subtract(at, part->centre, at);
+      for (size_t k = 0; k < 9; ++k) {
+        square[k / 3][k % 3] += at[k / 3] * at[k % 3] / n;
+      }
+      part->reach = fmax(part->reach, supine_length(at));
+    }
+  }
+  part->volume = n * supine_warp_tissue_voxel(mask);
+  part->radius = cbrt(1e3 * part->volume * 0.2387324146378430); /* 3 / (4 pi) */
+  return supine_mesh_is_compact(part->volume, (const double(*)[3])square);
+}
+
+static void free_part(supine_warp_part *part) {
+  supine_image_free(&part->mask);
+  free(part->outline);
+}
+
 /* Add the component to the parts, unless its shape is not compact. */
 static bool add_part(const search *s) {
   supine_tissue *tissue = s->tissue;
   supine_warp_part part = {.count = 0};
-  if (!s->named && (double)s->count * supine_warp_tissue_voxel(s->frame) < volume_least) {
+  const double volume = (double)s->count * supine_warp_tissue_voxel(s->frame);
+  if (!s->named && (volume > SUPINE_COMPACT_MOST_ML || volume < 0.1 * SUPINE_COMPACT_LEAST_ML)) {
     return true;
   }
-  if (!measure(s, &part)) {
+  bool good = make_mask(s, &part.mask) && (s->named || fill_cavities(&part.mask));
+  if (good && !measure(&part) && !s->named) {
+    free_part(&part);
     return true;
   }
   supine_warp_part *grown =
-      realloc(tissue->parts, (tissue->part_count + 1) * sizeof *tissue->parts);
+      good ? realloc(tissue->parts, (tissue->part_count + 1) * sizeof *tissue->parts) : NULL;
   if (grown == NULL) {
+    free_part(&part);
     return false;
   }
   tissue->parts = grown;
-  const bool good = make_mask(s, &part.mask) && make_outline(&part);
+  good = make_outline(&part);
   tissue->parts[tissue->part_count++] = part;
   for (size_t i = 0; i < s->count && !s->named; ++i) {
     set_stage(&s->stage[s->list[i]], SUPINE_TISSUE_PART);
@@ -330,6 +375,50 @@ static bool find_components(search *s) {
   }
   free(s->list);
   return good;
+}
+
+/* Return whether most voxels of the component lie in the lungs. */
+static bool lies_in_lungs(const search *s, const supine_image *depth) {
+  size_t inside = 0;
+  for (size_t i = 0; i < s->count; ++i) {
+    double x[3];
+    double voxel[3];
+    size_t at[3];
+    bool seen = true;
+    supine_image_place(s->frame, s->list[i], x);
+    supine_image_locate(depth, x, voxel);
+    for (size_t a = 0; a < 3; ++a) {
+      const double nearest = rint(voxel[a]);
+      seen = seen && nearest >= 0.0 && nearest < (double)depth->size[a];
+      at[a] = seen ? (size_t)nearest : 0;
+    }
+    const size_t node = at[0] + depth->size[0] * (at[1] + depth->size[1] * at[2]);
+    inside += seen && supine_image_get(depth, node) > 0.0 ? 1 : 0;
+  }
+  return 2 * inside > s->count;
+}
+
+supine_status supine_warp_tissue_find_labels(const supine_field *field, const supine_image *labels,
+                                             supine_tissue *tissue, supine_error *error) {
+  const size_t voxels = labels->size[0] * labels->size[1] * labels->size[2];
+  SUPINE_ARENA arena = {0};
+  unsigned char *stage = supine_arena_zeros(&arena, voxels, 1);
+  SUPINE_TRY(supine_arena_check(&arena, error, "a label map of %zu voxels", voxels));
+  search s = {.frame = labels, .stage = stage, .labels = labels, .tissue = tissue};
+  bool good = true;
+  for (size_t i = 0; i < voxels && good; ++i) {
+    s.label = has_stage(stage[i], 0) ? supine_image_get(labels, i) : 0.0;
+    if (s.label != 0.0) {
+      const double most = SUPINE_COMPACT_MOST_ML / supine_warp_tissue_voxel(labels);
+      good = find_component(&s, i);
+      if (good && (double)s.count <= most && lies_in_lungs(&s, &field->depth)) {
+        good = add_part(&s);
+      }
+    }
+  }
+  free(s.list);
+  return good ? supine_warp_tissue_group(tissue, error)
+              : supine_error_memory(error, "parts of a label map");
 }
 
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error) {
@@ -366,8 +455,7 @@ supine_status supine_warp_tissue_add_labels(const supine_image *labels, const do
 
 void supine_warp_tissue_free(supine_tissue *tissue) {
   for (size_t i = 0; i < tissue->part_count; ++i) {
-    supine_image_free(&tissue->parts[i].mask);
-    free(tissue->parts[i].outline);
+    free_part(&tissue->parts[i]);
   }
   free(tissue->parts);
   free(tissue->gap);

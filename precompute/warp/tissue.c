@@ -87,6 +87,7 @@ supine_status supine_warp_tissue_find(const supine_field *field, const supine_im
   }
   unsigned char *voxel = kind->values;
   mark(field, ct, voxel);
+  SUPINE_TRY(supine_warp_tissue_fill(kind, error));
   SUPINE_TRY(supine_warp_tissue_find_parts(tissue, error));
   for (size_t i = 0; i < count; ++i) { /* parts at the surface belong to the lungs */
     const bool part = (voxel[i] & SUPINE_TISSUE_STAGE) == SUPINE_TISSUE_PART;

@@ -46,13 +46,18 @@ typedef struct supine_tissue {
 } supine_tissue;
 
 /** Find the soft tissue of the lungs in a CT in Hounsfield units, and the parts in it that are
- * compact: at least 1 mL, and not elongated or branched like vessels. Parts over 30 mL are left
- * out: consolidated lung deforms.
+ * compact (supine_mesh_is_compact), with their cavities.
  * @param field   displacement field from the state of the CT
  * @param tissue  zero-initialised
  * Memory: a byte for each voxel. */
 supine_status supine_warp_tissue_find(const supine_field *field, const supine_image *ct,
                                       supine_tissue *tissue, supine_error *error);
+
+/** Find the parts of a label map that are compact and lie in the lungs: components of voxels of one
+ * label, with their cavities. For maps without a CT, which would show what is soft.
+ * @param tissue  zero-initialised */
+supine_status supine_warp_tissue_find_labels(const supine_field *field, const supine_image *labels,
+                                             supine_tissue *tissue, supine_error *error);
 
 /** Add the voxels with one of the given labels as parts, a part for each connected component. */
 supine_status supine_warp_tissue_add_labels(const supine_image *labels, const double *wanted,
@@ -84,6 +89,8 @@ supine_status supine_warp_tissue_hold(const supine_tissue *tissue, supine_field 
                                       supine_field *inverse, supine_warp_tissue_held *held,
                                       supine_error *error);
 
+/* Internal: make the voxels soft that are not, but are enclosed by soft ones (cavities.c). */
+supine_status supine_warp_tissue_fill(supine_image *kind, supine_error *error);
 /* Internal: find the compact parts among the voxels of `kind` that are soft (parts.c). */
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error);
 /* Internal: put parts that are close to each other into groups, and find the gaps between groups.

@@ -67,8 +67,14 @@ const supine_option supine_command_deform_content_options[] = {
      "their size and shape, in all outputs for this state; the header of the output says so",
      SUPINE_FILLS(supine_deform_content, density)},
     {"labels", 0, "FILE",
-     "label map to move and write to -o; each voxel takes the label of the nearest voxel",
+     "label map to move and write to -o, or to --labels-out if --image is given, too; each voxel "
+     "takes the label of the nearest voxel. Compact parts keep their size and shape: those that "
+     "the CT of --image with --density shows, or else compact labels of 1 to 30 mL",
      SUPINE_FILLS(supine_deform_content, labels), .file = SUPINE_FILE_IN},
+    {"labels-out", 0, "FILE",
+     "label map to write if --image and --labels are given (.nrrd, .nii, .nii.gz or .mha)",
+     SUPINE_FILLS(supine_deform_content, labels_path), .file = SUPINE_FILE_OUT,
+     .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"rigid", 0, "VALUE,...",
      "values in the label map of --labels of parts that keep their size and shape, such as "
      "tumours, "
@@ -92,8 +98,8 @@ supine_status supine_command_deform_content_check(const supine_deform_content *w
   SUPINE_REFUSE_IF((wanted->image != NULL && wanted->labels != NULL) !=
                        (wanted->labels_path != NULL),
                    error, SUPINE_ERROR_ARGUMENT,
-                   "--image with --labels needs a list of --states with the column labels, and "
-                   "this column needs both");
+                   "--image with --labels needs --labels-out FILE, or with --states the column "
+                   "labels, and these need both: give all three");
   SUPINE_REFUSE_IF(wanted->labels_path != NULL && !supine_image_supports(wanted->labels_path),
                    error, SUPINE_ERROR_ARGUMENT,
                    "%s: the name must end in .nrrd, .nii, .nii.gz or .mha", wanted->labels_path);
@@ -257,6 +263,12 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
     supine_findings findings = {.count = 0};
     supine_warp_check_soft(soft, wanted->image, &findings);
     supine_options_say_findings("deform", &findings);
+  } else if (wanted->labels != NULL) {
+    SUPINE_TRY(supine_warp_tissue_find_labels(forward, &wanted->label_source, soft, error));
+    if (soft->part_count > 0) {
+      (void)printf("%s: without a CT, the shape of labels tells which parts are rigid\n",
+                   wanted->labels);
+    }
   }
   SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
                                            wanted->rigid.count, soft, error));

@@ -68,8 +68,8 @@ static const supine_option table[] = {
      .wants =
          "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
     {"rigid", 0, "all|NAME,...",
-     "parts that keep their size and shape and rotate with the tissue, such as nodules and "
-     "tumours; other parts deform",
+     "further parts that keep their size and shape and rotate with the tissue. Compact parts of 1 "
+     "to 30 mL, such as nodules and tumours, always do; other parts deform",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
      "move structures outside the lungs like the nearest point of the surface; by default the "
@@ -139,6 +139,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   }
   SUPINE_TRY(supine_command_embed_read(&shells, &wanted->content, given->operand + 1,
                                        given->count - 1, &content, error));
+  SUPINE_TRY(supine_inside_content_find_compact(&content, error));
   if (wanted->rigid != NULL) {
     SUPINE_TRY(supine_inside_content_make_rigid(&content, wanted->rigid, error));
   }

@@ -906,7 +906,6 @@ TEST(test_embed_rigid_part_keeps_volume_and_follows_field) {
   assert_int_equal(supine_inside_content_make_rigid(&content, "tumor", &error),
                    SUPINE_ERROR_ARGUMENT);
   assert_says(error.message, "'tumor'");
-  free(content.rigid);
   assert_int_equal(supine_inside_content_make_rigid(&content, "tumour", NULL), SUPINE_OK);
   assert_int_equal(embed(&content, false, 0).rigid, 1);
   supine_basis *inside = helper_open(inside_path);
