@@ -10,8 +10,8 @@
  * The band and the order of a fit are the highest degrees of its harmonics and of its polynomials.
  * By default they are chosen by the error of runs that are left out: each run alone, and the runs
  * of one volume between the smallest and the largest. More terms are chosen if they reduce this
- * error by more than 1 %. The error that is stated leaves out all runs of a direction in place of
- * each run alone. */
+ * error by more than 1 %, and do not raise the error that is stated. This leaves out all runs of a
+ * direction in place of each run alone. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 

@@ -116,7 +116,8 @@ typedef struct choice {
   supine_runs runs;
   int wanted;         /* band, or negative */
   size_t order_least; /* lower orders are only compared */
-  double least;       /* error of the chosen fit */
+  double least;       /* error of the chosen fit in single runs and inner volumes */
+  double stated;      /* its error in whole directions and inner volumes */
   /* Relative errors of inner volumes that were left out; 0 if the others do not determine them. */
   double inner[SUPINE_FIT_ORDER_MAX + 1][SUPINE_FIT_BAND_MAX + 1];
 } choice;
@@ -148,7 +149,8 @@ static supine_status leave_out_volumes(const supine_fit *fit, choice *c, const s
 
 /* Fit up to a band and an order. Choose the fit if it is wanted or clearly better, by the errors of
  * single runs and of inner volumes. The error that is stated has whole directions in place of
- * single runs, because states between the runs have other directions.
+ * single runs, because states between the runs have other directions; it must not grow, as it does
+ * where the harmonics are almost as many as the directions.
  * @param determined  written: whether the runs determine this fit */
 static supine_status try_fit(supine_fit *fit, choice *c, size_t band, size_t order,
                              bool *determined) {
@@ -179,9 +181,11 @@ static supine_status try_fit(supine_fit *fit, choice *c, size_t band, size_t ord
   const double error = relative_error(add_sums(each, volumes));
   report->error[order][band] = between > 0.0 ? hypot(relative_error(whole), between)
                                              : relative_error(add_sums(whole, volumes));
-  if ((c->wanted < 0 || (size_t)c->wanted == band) && error < worthwhile * c->least &&
-      c->least > exact) {
+  const double stated = report->error[order][band];
+  const bool better = error < worthwhile * c->least && stated <= c->stated;
+  if ((c->wanted < 0 || (size_t)c->wanted == band) && better && c->least > exact) {
     c->least = error;
+    c->stated = stated;
     fit->chosen = trial;
     report->band = band;
     report->order = order;
@@ -236,7 +240,8 @@ static supine_status choose(supine_fit *fit, int wanted, supine_error *error) {
                        .volume = fit->parameter},
               .wanted = wanted,
               .order_least = levels > 1 ? 1 : 0,
-              .least = INFINITY};
+              .least = INFINITY,
+              .stated = INFINITY};
   size_t highest = 0; /* band that the runs determine with any order, plus 1 */
   fit->inner_groups = fit->groups.count - fit->direction_groups;
   for (size_t order = 0; order <= order_most; ++order) {
