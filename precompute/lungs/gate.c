@@ -348,19 +348,31 @@ static void check_overlap(checks *c, const supine_lungs *lungs) {
   }
 }
 
-/* Check that the backs of two lungs are level, as one person's are. Bases and apices differ more. */
+/* Return by how much of its height the lower of two lungs lies below the other: both its base and
+ * its apex do, as a lung may be short after surgery, or above a raised diaphragm. */
+static double lower_by(const supine_lungs *lungs) {
+  const double base = lungs->low[0][2] - lungs->low[1][2];
+  const double apex = lungs->high[0][2] - lungs->high[1][2];
+  const double height =
+      fmax(lungs->high[0][2] - lungs->low[0][2], lungs->high[1][2] - lungs->low[1][2]);
+  return base * apex > 0.0 ? fmin(fabs(base), fabs(apex)) / height : 0.0;
+}
+
+/* Check that two lungs are level, as one person's are: their backs, and their bases and apices. */
 static void check_level(checks *c, const supine_lungs *lungs) {
-  const double depth[2] = {lungs->high[0][1] - lungs->low[0][1],
-                           lungs->high[1][1] - lungs->low[1][1]};
-  const double apart = fabs(lungs->high[0][1] - lungs->high[1][1]);
-  check(c,
-        lungs->lung_count < 2 ||
-            supine_input_judge(SUPINE_INPUT_LUNGS_LEVEL, apart / fmax(depth[0], depth[1])) ==
-                SUPINE_INPUT_TAKEN,
+  const double depth =
+      fmax(lungs->high[0][1] - lungs->low[0][1], lungs->high[1][1] - lungs->low[1][1]);
+  if (lungs->lung_count < 2) {
+    return;
+  }
+  const double backs = fabs(lungs->high[0][1] - lungs->high[1][1]) / depth;
+  const double lower = lower_by(lungs);
+  check(c, supine_input_judge(SUPINE_INPUT_LUNGS_LEVEL, fmax(backs, lower)) == SUPINE_INPUT_TAKEN,
         SUPINE_OK, NULL,
-        "the back of one lung lies %.0f mm in front of the other's: check that both lungs are of "
-        "one person, in one frame",
-        apart);
+        "one lung lies %s of the other by %.0f %% of its %s: check that both lungs are of one "
+        "person, in one frame",
+        backs > lower ? "in front" : "below the level", 100.0 * fmax(backs, lower),
+        backs > lower ? "depth" : "height");
 }
 
 /* Divide the triangles between two lungs along the axis on which the two overlap least. Return the

@@ -82,13 +82,19 @@ supine_status supine_validation_check_landmarks(const supine_validation *subject
                                                 const supine_mesh *scan,
                                                 const supine_patient_pairs *pairs,
                                                 supine_findings *findings, supine_error *error) {
-  if (subject->from.text[0] == '\0') {
+  static const double same_volume = 0.01;
+  const supine_state shown = supine_basis_scan(subject->basis);
+  supine_pose pose;
+  SUPINE_TRY(supine_basis_scan_pose(subject->basis, &pose, error));
+  const double scanned = supine_posed_volume(subject->basis, &pose);
+  if (supine_distance(subject->from.state.gravity, shown.gravity) < same_posture &&
+      fabs(scanned - subject->from_millilitres) <= same_volume * scanned) {
     SUPINE_TRY(supine_patient_check_landmarks("basis", &subject->start, pairs->count, pairs->from,
                                               findings, error));
   }
   if (scan != NULL) {
-    SUPINE_TRY(supine_patient_check_landmarks("scan", scan, pairs->count, pairs->to, findings,
-                                              error));
+    SUPINE_TRY(
+        supine_patient_check_landmarks("scan", scan, pairs->count, pairs->to, findings, error));
   }
   return SUPINE_OK;
 }

@@ -119,6 +119,13 @@ static supine_status check_labels(const supine_field *field, const supine_image 
     double point[3];
     double depth = 0.0;
     supine_warp_cell cell;
+    SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_LABEL_VALUE, fabs(label - rint(label))) ==
+                             SUPINE_INPUT_REFUSED &&
+                         !(label > 0.0 && label < 1.0),
+                     error, SUPINE_ERROR_FORMAT,
+                     "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535, and "
+                     "probabilities are 0 to 1: give labels or probabilities",
+                     path, label);
     if (!(label >= 1.0 && label < LABELS)) {
       continue;
     }
@@ -151,10 +158,9 @@ supine_status supine_warp_check_image(const supine_field *field, const supine_im
   if (s.nodes == 0) {
     return SUPINE_OK;
   }
-  const bool ct = kind == SUPINE_FIELD_CT ||
-                  (kind == SUPINE_FIELD_IMAGE && supine_warp_is_hounsfield(image));
-  const supine_input_verdict verdict =
-      describe(&s, ct, kind == SUPINE_FIELD_CT, text, sizeof text);
+  const bool ct =
+      kind == SUPINE_FIELD_CT || (kind == SUPINE_FIELD_IMAGE && supine_warp_is_hounsfield(image));
+  const supine_input_verdict verdict = describe(&s, ct, kind == SUPINE_FIELD_CT, text, sizeof text);
   SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED && kind == SUPINE_FIELD_CT, error,
                    SUPINE_ERROR_FORMAT, "%s: %s", path, text);
   if (verdict != SUPINE_INPUT_TAKEN) {
