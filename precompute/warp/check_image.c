@@ -119,10 +119,9 @@ static supine_status check_labels(const supine_field *field, const supine_image 
     double point[3];
     double depth = 0.0;
     supine_warp_cell cell;
-    SUPINE_REFUSE_IF(supine_input_judge(SUPINE_INPUT_LABEL_VALUE, fabs(label - rint(label))) ==
-                             SUPINE_INPUT_REFUSED &&
-                         !(label > 0.0 && label < 1.0),
-                     error, SUPINE_ERROR_FORMAT,
+    const double off = label > 0.0 && label < 1.0 ? 0.0 : fabs(label - rint(label));
+    const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_LABEL_VALUE, off);
+    SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_FORMAT,
                      "%s: a voxel holds %g, but labels are whole numbers, 0 to 65535, and "
                      "probabilities are 0 to 1: give labels or probabilities",
                      path, label);
