@@ -33,7 +33,7 @@ typedef struct request {
   const char *postures;
   const char *output;
   const char *inside;
-  bool json;
+  bool json, all;
   int frame; /* 1 if the hilum stays in place, 0 if the body does */
   bool has_breath;
 } request;
@@ -53,6 +53,8 @@ static const supine_option table[] = {
      "each, with its expected error",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
     {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
+    {"all", 0, NULL, "also print the breath, and the regional expansion by height, as -o has them",
+     SUPINE_FILLS(request, all)},
     {"output", 'o', "FILE",
      ".html: a report to read and print\n.csv: a table with a row for the surface, each lung and "
      "each structure in each posture; docs/compare.md describes it and --json",
@@ -142,7 +144,7 @@ static supine_status report(supine_comparison *c, const request *wanted, supine_
     SUPINE_TRY(supine_options_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
   }
   SUPINE_TRY(supine_report_find(c, error));
-  supine_report_print(c, wanted->json);
+  supine_report_print(c, wanted->json, wanted->all);
   return wanted->output != NULL ? write_file(wanted->output, c, error) : SUPINE_OK;
 }
 

@@ -210,11 +210,35 @@ static supine_status describe(const char *path, const supine_basis *basis, const
 }
 
 typedef struct request {
-  bool json;
+  bool json, all;
 } request;
 
 static const supine_option table[] = {
-    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)}, {.name = NULL}};
+    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
+    {"all", 0, NULL, "also print the terms of the expected error, and how the basis is made",
+     SUPINE_FILLS(request, all)},
+    {.name = NULL}};
+
+/* What the text begins with: what the basis is, how sure, and what is assumed. */
+static const char *const first[] = {"file",    "lungs",          "made_by",  "expected_error",
+                                    "facts",   "resting_shares", "warnings", "embedded"};
+
+/* Put what matters into the order of the text, and add the rest if it is wanted. Free `described`.
+ */
+static json_t *order_text(json_t *described, bool all) {
+  json_t *text = json_object();
+  for (size_t i = 0; i < sizeof first / sizeof *first; ++i) {
+    json_t *value = json_object_get(described, first[i]);
+    if (value != NULL) {
+      (void)json_object_set(text, first[i], value);
+    }
+  }
+  if (all) {
+    (void)json_object_update_missing(text, described);
+  }
+  json_decref(described);
+  return text;
+}
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   const request *wanted = chosen;
@@ -229,6 +253,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu bands", bands));
   SUPINE_TRY(band_energy(basis, energy, error));
   SUPINE_TRY(describe(path, basis, energy, wanted->json, &described, error));
+  if (!wanted->json) {
+    described = order_text(described, wanted->all);
+  }
   supine_options_print(json_incref(described), wanted->json);
   return SUPINE_OK;
 }
@@ -236,7 +263,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 const supine_command supine_command_info = {
     "info",
     "describe a basis file and its accuracy",
-    .usage = "BASIS [--json]",
+    .usage = "BASIS [--json|--all]",
     .about = "Describes a basis file: its lungs, its basis functions (modes), the model it was "
              "made with, and its accuracy.",
     .options = table,

@@ -40,6 +40,6 @@ json_t *supine_options_json_metadata(const supine_basis *basis);
   "within 1.8 times"
 #define SUPINE_EXPECTED_SUPPORT                                                                    \
   "The expected error was measured on breaths in one posture; for a change of posture it is an "   \
-  "extrapolation. 'supine info' lists its terms."
+  "extrapolation. 'supine info --all' lists its terms."
 
 #endif

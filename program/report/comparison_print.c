@@ -92,7 +92,7 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
 }
 
 /* Add to `text` the tables that compare the postures. */
-static void add_tables(const supine_comparison *c, json_t *text) {
+static void add_tables(const supine_comparison *c, bool all, json_t *text) {
   char gained[64];
   (void)supine_print_text(gained, sizeof gained,
                           "volume (mL) that each lung gains in a breath of %.4g mL", c->breath);
@@ -110,18 +110,19 @@ static void add_tables(const supine_comparison *c, json_t *text) {
       (void)json_object_set_new(moved, "error of the hilum", json_real(p->hilum.expected));
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
-    if (c->inside != NULL) {
+    if (c->inside != NULL && p->displacement.max > 0.0) {
       for (size_t k = 0; k < c->names.count; ++k) {
         add_row(text, p->targets[k].anatomy ? "anatomy" : "targets", "posture", p->label,
                 supine_options_target_json(&p->targets[k]));
       }
     }
     add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));
-    if (p->has_breath) {
+    if (p->has_breath && all) {
       add_row(text, gained, "posture", p->label, by_lung(c, p->gain));
     }
   }
-  for (size_t s = 0; c->breath > 0.0 && s < SUPINE_COMPARISON_SLABS; ++s) {
+  const size_t slabs = all && c->breath > 0.0 ? SUPINE_COMPARISON_SLABS : 0;
+  for (size_t s = 0; s < slabs; ++s) {
     json_auto_t *values = json_object(); /* stays empty if no posture has a breath */
     char height[16];
     (void)snprintf(height, sizeof height, "%zu-%zu", 100 - 10 * (s + 1), 100 - 10 * s);
@@ -139,7 +140,27 @@ static void add_tables(const supine_comparison *c, json_t *text) {
   }
 }
 
-void supine_report_print(const supine_comparison *c, bool json) {
+/* Return the text in the order of what was asked for: targets, displacements, volumes. The file and
+ * its surface are left out unless all is wanted. Free `root`. */
+static json_t *order_text(json_t *root, bool all) {
+  static const char *const first[] = {"volume", "displacement_from", "targets"};
+  static const char *const left_out[] = {"file", "vertices", "area_mm2"};
+  json_t *text = json_object();
+  for (size_t i = 0; i < 3; ++i) {
+    json_t *value = json_object_get(root, first[i]);
+    if (value != NULL) {
+      (void)json_object_set(text, first[i], value);
+    }
+    if (!all) {
+      (void)json_object_del(root, left_out[i]);
+    }
+  }
+  (void)json_object_update_missing(text, root);
+  json_decref(root);
+  return text;
+}
+
+void supine_report_print(const supine_comparison *c, bool json, bool all) {
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
   json_t *root = json_pack("{s:i, s:o, s:s, s:s, s:I, s:f}", "schema", SUPINE_COMPARISON_SCHEMA,
@@ -157,11 +178,12 @@ void supine_report_print(const supine_comparison *c, bool json) {
     }
     (void)json_object_set_new(root, "postures", postures);
   } else {
-    add_tables(c, root);
+    add_tables(c, all, root);
     if (c->has_errors) {
       (void)json_object_set_new(root, "expected error",
                                 json_string(SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT));
     }
+    root = order_text(root, all);
   }
   supine_options_print(root, json);
 }
