@@ -323,7 +323,11 @@ static void receive_all(supine_stream_server *s) {
     if (supine_stream_web_take(s->options->web, gravity, &received)) {
       supine_error error;
       if (supine_stream_patient_pose(&s->patient, gravity, received, &error) != SUPINE_OK) {
-        supine_stream_patient_warn(&s->patient, s->woke, "%s", supine_options_explain(&error).text);
+        const supine_explained why = supine_options_explain(&error);
+        supine_stream_patient_warn(&s->patient, s->woke, "%s", why.text);
+        supine_stream_web_tell(s->options->web, why.text);
+      } else {
+        supine_stream_web_tell(s->options->web, "");
       }
     }
   }

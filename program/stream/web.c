@@ -7,6 +7,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -40,6 +41,7 @@ static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } lws;
 enum {
   CONNECTIONS_MAX = 128, /* viewers, and browsers that load the page */
   TEXT = 256,            /* size of the buffer for a state as JSON, bytes */
+  TOLD = 2200,           /* size of the buffer for the reason of a refusal as JSON, bytes */
   RECEIVED = 512,        /* size of the buffer for received bytes */
   HEADERS = 1024,        /* size of the buffer for the headers of an answer, bytes */
   PIECE = 1 << 14,       /* part of the page that is sent at once, bytes */
@@ -56,6 +58,7 @@ struct supine_stream_web {
   pthread_mutex_t lock; /* protects the following fields of this struct */
   uint64_t number;      /* serial number of the state in `text`: 1, 2, ... */
   char text[TEXT];      /* newest state as JSON; send_state() appends the age of the pose and "}" */
+  char told[TOLD];      /* why the last pose of a viewer is refused, as JSON; "" if it is taken */
   double pose_received; /* time of receipt of the newest pose or observed point, s; -1 if none */
 };
 
@@ -141,12 +144,12 @@ static void receive(supine_stream_web *web, const char *bytes, size_t size) {
  * @param sent  serial number of the last state sent to this viewer, updated */
 static int send_state(supine_stream_web *web, struct lws *wsi, uint64_t *sent) {
   enum { AGE = 32 };
-  unsigned char bytes[LWS_PRE + TEXT + AGE];
+  unsigned char bytes[LWS_PRE + TEXT + TOLD + AGE];
   (void)pthread_mutex_lock(&web->lock);
-  const uint64_t number = web->number;
+  const uint64_t number = web->text[0] != '\0' ? web->number : *sent;
   const double age = web->pose_received >= 0 ? supine_clock_seconds() - web->pose_received : -1;
-  const int size =
-      supine_print_text((char *)bytes + LWS_PRE, TEXT + AGE, "%s,\"age\":%.3f}", web->text, age);
+  const int size = supine_print_text((char *)bytes + LWS_PRE, TEXT + TOLD + AGE,
+                                     "%s%s,\"age\":%.3f}", web->text, web->told, age);
   (void)pthread_mutex_unlock(&web->lock);
   if (number == *sent) {
     return 0;
@@ -339,6 +342,21 @@ bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *r
     posed = true;
   }
   return posed;
+}
+
+void supine_stream_web_tell(supine_stream_web *web, const char *why) {
+  SUPINE_C_LOCALE;
+  json_auto_t *reason = json_pack("{s:s}", "refused", why);
+  char *text = reason == NULL ? NULL : json_dumps(reason, JSON_COMPACT); /* {"refused":"..."} */
+  (void)pthread_mutex_lock(&web->lock);
+  web->told[0] = '\0';
+  if (why[0] != '\0' && text != NULL && strlen(text) < sizeof web->told) {
+    (void)snprintf(web->told, sizeof web->told, ",%.*s", (int)strlen(text) - 2, text + 1);
+  }
+  ++web->number;
+  (void)pthread_mutex_unlock(&web->lock);
+  free(text);
+  lws.cancel_service(web->context);
 }
 
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot) {

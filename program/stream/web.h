@@ -48,6 +48,10 @@ int supine_stream_web_descriptor(const supine_stream_web *web);
  * @param received  set to the time at which the pose was received, s by supine_clock_seconds */
 bool supine_stream_web_take(supine_stream_web *web, double gravity[3], double *received);
 
+/** Tell all viewers, with the next state, that a pose which one of them has sent is refused, and why.
+ * @param why  "" after a pose that is taken */
+void supine_stream_web_tell(supine_stream_web *web, const char *why);
+
 /** Send a state to each viewer as soon as the viewer is ready, unless a newer state replaces it. */
 void supine_stream_web_send(supine_stream_web *web, const supine_stream_snapshot *snapshot);
 

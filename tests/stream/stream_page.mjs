@@ -131,6 +131,16 @@ for (const [name, beta, gamma, gravity] of [
   await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta, gamma });
   await expectGravity(gravity, name);
 }
+// A pose that is refused is told on the page, until one is taken.
+const status = (wanted) =>
+  viewers[0].waitForFunction((text) => new RegExp(text).test(document.querySelector('#live p').textContent), wanted);
+await viewers[0].evaluate(() => {
+  const other = new WebSocket(`ws://${location.host}/`, 'supine');
+  other.addEventListener('open', () => other.send('{"gravity":[0,0,0]}'));
+});
+await status('^a pose is refused: ');
+await phone.send('DeviceOrientation.setDeviceOrientationOverride', { alpha: 30, beta: 45, gamma: 0 });
+await status('^live$');
 // The page is served on 127.0.0.1 only: a connection to another address of this machine is refused.
 const elsewhere = await new Promise((done) => {
   const socket = createConnection(Number(new URL(site).port), '127.0.0.2');

@@ -40,14 +40,17 @@ function turned(q, gravity) {
 }
 
 /** Show a state: gravity in the patient's axes (x left, y back, z head), and the volume above rest, mL. `age` is
- * the age of the newest pose, s, or negative if there is no pose. */
-function show({ gravity, above, age }) {
+ * the age of the newest pose, s, or negative if there is no pose, and `refused` the reason if the last pose of a device
+ * was refused. */
+function show({ gravity, above, age, refused = '' }) {
+  const news = refused || 'live';
+  if (said.textContent !== news) said.textContent = news;
   posed = age < 0 ? NaN : performance.now() - 1000 * age;
   tellAge();
   const page = window.supine;
   if (!page) {
     // the page still reads the lungs
-    requestAnimationFrame(() => show({ gravity, above, age }));
+    requestAnimationFrame(() => show({ gravity, above, age, refused }));
     return;
   }
   moments += 1;
