@@ -2,6 +2,7 @@
 /* Check that lungs can hold the volumes of a state, by the range that the file holds. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include <supine/inputs.h>
 
@@ -118,17 +119,35 @@ static supine_status advise_folds(supine_error *error) {
   return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);
 }
 
-supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
-                                 const supine_pose *pose, supine_error *error) {
+/* Return whether lungs can hold a pose; if not, write the state and why. */
+static bool judge(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
+                  char text[420]) {
   char wrong[256];
   if (can_hold(basis, state, pose, wrong, sizeof wrong)) {
+    return true;
+  }
+  (void)supine_state_describe(state, text, 160);
+  const size_t length = strlen(text);
+  (void)supine_print_text(text + length, 420 - length, ": %s", wrong);
+  return false;
+}
+
+supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
+                                 const supine_pose *pose, supine_error *error) {
+  char text[420];
+  if (judge(basis, state, pose, text)) {
     return SUPINE_OK;
   }
-  char text[160];
-  (void)supine_state_describe(state, text, sizeof text);
-  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: %s: choose a volume nearer to rest",
-                         text, wrong);
+  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: choose a volume nearer to rest", text);
   return advise_folds(error);
+}
+
+void supine_basis_tell(const supine_basis *basis, const supine_state *state,
+                       const supine_pose *pose, supine_findings *findings) {
+  char text[420];
+  if (!judge(basis, state, pose, text)) {
+    supine_findings_warn(findings, "%s", text);
+  }
 }
 
 supine_status supine_basis_pose(const supine_basis *basis, const supine_state *state,

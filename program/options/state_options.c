@@ -13,6 +13,7 @@
 #include "precompute/posed/posed.h"
 #include "program/options/basis_input.h"
 #include "program/options/state_options.h"
+#include "program/options/surface_options.h"
 #include "runtime/checks.h"
 
 static supine_status read_state(const char *text, void *field, supine_error *error) {
@@ -235,13 +236,12 @@ static supine_status tell_folds(const supine_basis *basis, const char *command,
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error) {
-  supine_error allowed;
+  supine_findings findings = {.count = 0};
   SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
   if (!supine_basis_has_range_of_volumes(basis)) {
     return tell_folds(basis, command, state, pose, error);
   }
-  if (supine_basis_check(basis, state, pose, &allowed) != SUPINE_OK) {
-    supine_options_say(command, "warning: %s", allowed.message);
-  }
+  supine_basis_tell(basis, state, pose, &findings);
+  supine_options_say_findings(command, &findings);
   return SUPINE_OK;
 }

@@ -43,6 +43,12 @@ export interface Fact {
   caveat: boolean;
 }
 
+/** What a check tells of an input: a warning, or a note for information. */
+export interface Finding {
+  warning: boolean;
+  text: string;
+}
+
 /** An open basis and its posed surface. Arrays are views of WebAssembly memory that never moves: write only to
  * `positions` and `normals`. Lengths are in mm, volumes in mL, axes are LPS: +x left, +y posterior, +z head. */
 export interface Basis {
@@ -58,6 +64,8 @@ export interface Basis {
   readonly facts: Fact[];
   /** All facts with a caveat as one line, which views of the lungs must show. */
   readonly caveats: string;
+  /** What the checks tell of the pose: with `allowFolds`, why lungs cannot hold it; otherwise it is refused. */
+  readonly findings: Finding[];
   /** Positions [3 N], mm, of the last `deform` or `deformLit`; at first the reference positions. */
   readonly positions: Float32Array;
   /** Unit normals [3 N] of the last `deformLit`. */

@@ -94,6 +94,7 @@ class Basis {
   #normals;
   #expected;
   #facts;
+  #isChecked = false; // whether the pose is that of the state, which poseScan does not set
 
   constructor(instance, bytes, options) {
     this.#c = instance.exports;
@@ -203,12 +204,14 @@ class Basis {
       this.#check(poseGain(this.#basis, this.#nextState, number(state.gain, 'gain'), this.#nextPose, this.#error));
     }
     this.#take();
+    this.#isChecked = true;
     return this;
   }
 
   poseScan() {
     this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
     this.#take();
+    this.#isChecked = false;
     return this;
   }
 
@@ -279,6 +282,12 @@ class Basis {
       source: this.#string(this.#c.supine_fact_source_name(source)), origin: this.#string(origin),
       line: this.#string(this.#text), caveat: this.#c.supine_fact_is_caveat(at) !== 0,
     };
+  }
+
+  get findings() {
+    if (!this.#isChecked) return [];
+    const status = this.#c.supine_basis_check(this.#basis, this.#state, this.#pose, this.#error);
+    return status === 0 ? [] : [{ warning: true, text: this.#string(this.#error + 4) }];
   }
 
   get caveats() {

@@ -156,6 +156,16 @@ for (const nothing of [null, '', [], '1', true]) {
   assert.throws(() => lungs.pose({ gravity: nothing }), numberWanted(/gravity must be three numbers/));
 }
 assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain: 9.81 }), { status: 'numerical', message: /allowFolds/ });
+
+/* A pose that lungs cannot hold is refused or, if that is allowed, told. */
+assert.throws(() => lungs.pose('supine:full+2L'), { status: 'numerical', message: /allowFolds: true/ });
+assert.deepEqual(lungs.pose('prone').findings, []);
+const allowed = await open(bytes, { allowFolds: true });
+assert.deepEqual(allowed.findings, []);
+assert.match(allowed.pose('supine:full+2L').findings[0].text, /of full inflation .*, outside the 10 to 120 %/);
+assert.equal(allowed.findings[0].warning, true);
+assert.equal(allowed.findings.length, 1);
+assert.deepEqual(allowed.pose('prone').findings, []);
 for (const gain of [NaN, Infinity])
   assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);

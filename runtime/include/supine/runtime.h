@@ -39,6 +39,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <supine/findings.h>
 #include <supine/safetensors.h>
 #include <supine/state.h>
 #include <supine/status.h>
@@ -285,6 +286,12 @@ SUPINE_API supine_status supine_basis_coefficients(const supine_basis *basis, si
  * @retval SUPINE_ERROR_NUMERICAL  lungs cannot hold these volumes; `error` says which */
 SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
                                             const supine_pose *pose, supine_error *error);
+
+/** Tell what supine_basis_check refuses in a pose, as a warning: what a host does after
+ * supine_basis_pose with supine_basis_options.allow_folds.
+ * @param findings  the warning is added, if lungs cannot hold the pose */
+SUPINE_API void supine_basis_tell(const supine_basis *basis, const supine_state *state,
+                                  const supine_pose *pose, supine_findings *findings);
 
 /** Return the default volume of a basis (supine_basis_pose). If the default is to multiply
  * displacements by 1, whatever the volume, the kind of the result is SUPINE_VOLUME_DEFAULT. */

@@ -372,10 +372,15 @@ class Basis:
     def pose(self, state: Gravity, volume: Volume = "", out: Optional[Pose] = None) -> Pose:
         """Compute the pose of a state: `pose("prone:rest+500")`, `pose("full-300")` (supine),
         `pose((0, 0.6, -0.8), "rest")`, or with a volume for each lung, `pose("prone", {"left": "rest", "right":
-        "2L"})`. The default volume is rest if the basis has a volume at rest. `out` is a pose to write into."""
+        "2L"})`. The default volume is rest if the basis has a volume at rest. `out` is a pose to write into.
+        Warns of a volume that lungs cannot hold, if the basis was opened with `allow_folds`."""
         out, wanted = Pose() if out is None else out, _state(state, volume)
         _c.basis_pose(self._c, wanted, out)
         out._made = self._owner, wanted.gravity
+        if self._options["allow_folds"]:
+            findings = _c.Findings()
+            _c.basis_tell(self._c, wanted, out, findings)
+            _program.warn(_program.told(findings))
         return out
 
     def expected_error(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> Floats:
