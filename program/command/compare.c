@@ -11,6 +11,7 @@
 
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/fiducials.h"
 #include "program/options/hilum.h"
 #include "program/options/inside.h"
 #include "program/options/state_options.h"
@@ -34,7 +35,7 @@ typedef struct request {
   const char *output;
   const char *inside;
   bool json, all;
-  int frame; /* 1 if the hilum stays in place, 0 if the body does */
+  supine_frame frame;
   bool has_breath;
 } request;
 
@@ -44,7 +45,7 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, postures), .standard = "supine,prone,left,right"},
     {.table = supine_options_volume, SUPINE_FILLS(request, comparison.volume)},
     {.table = supine_options_from, SUPINE_FILLS(request, comparison.from)},
-    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
+    {.table = supine_options_fiducials_frame, SUPINE_FILLS(request, frame)},
     {"breath", 0, "VOLUME", "tidal volume of the breath whose ventilation by height is computed",
      SUPINE_FILLS(request, comparison.breath), SUPINE_SAYS_GIVEN(request, has_breath),
      .standard = "500mL", SUPINE_BREATH},
@@ -71,10 +72,13 @@ static void add_target(const supine_posture_item *const item[2], const supine_ta
 }
 
 /* Append to the lists the displacements of each named structure and of the hilum between two
- * postures. If `in_hilum`, subtract the hilum's from the others. */
+ * postures. In the frame of the hilum, subtract its displacement from the others; in that of
+ * points, register both postures there. */
 static supine_status add_pair(const supine_basis *basis, const supine_options_names *names,
-                              const supine_posture_item *const item[2], bool in_hilum,
+                              const supine_posture_item *const item[2], const supine_frame *frame,
                               json_t *lists, supine_error *error) {
+  const bool in_hilum = frame->hilum;
+  supine_motion motion[2];
   supine_target row = {.name = in_hilum ? "hilum, subtracted" : "hilum"};
   supine_hilum hilum;
   supine_pose pose[2];
@@ -85,6 +89,10 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
     SUPINE_TRY(supine_basis_pose(basis, &item[i]->state, &pose[i], error));
   }
   SUPINE_TRY(supine_posed_errors(basis, &item[1]->state, &item[0]->state, &errors, error));
+  if (frame->points != NULL) {
+    const supine_state *states[2] = {&item[1]->state, &item[0]->state};
+    SUPINE_TRY(supine_options_fiducials(frame->points, basis, states, &errors, motion, error));
+  }
   if (in_hilum) {
     SUPINE_TRY(
         supine_options_hilum_expected(basis, &item[1]->state, &scan, &errors.position, error));
@@ -100,9 +108,12 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
     if (in_hilum) {
       supine_options_target_shift(&targets[i], hilum.move);
     }
+    if (frame->points != NULL) {
+      supine_options_fiducials_target(motion, &targets[i]);
+    }
     add_target(item, &targets[i], lists);
   }
-  if (supine_length(hilum.move) > 0.0) {
+  if (supine_length(hilum.move) > 0.0 && frame->points == NULL) {
     memcpy(row.move, hilum.move, sizeof row.move);
     row.moved = supine_length(hilum.move);
     row.moved_error = hilum.expected;
@@ -123,7 +134,7 @@ static supine_status compare_content(supine_comparison *c, const request *wanted
   for (size_t i = 0; i < c->postures.count; ++i) {
     for (size_t j = i + 1; j < c->postures.count; ++j) {
       const supine_posture_item *const item[2] = {&c->postures.item[i], &c->postures.item[j]};
-      SUPINE_TRY(add_pair(c->basis, &c->names, item, wanted->frame == 1, lists, error));
+      SUPINE_TRY(add_pair(c->basis, &c->names, item, &wanted->frame, lists, error));
     }
   }
   supine_options_print(json_incref(lists), wanted->json);
@@ -177,11 +188,12 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
       "%s holds structures inside the lungs, but -o needs the lungs: give the basis of the "
       "lungs, and the structures by --inside",
       c->path);
-  SUPINE_REFUSE_IF(
-      !content && wanted->frame == 1, error, SUPINE_ERROR_ARGUMENT,
-      "%s holds no structures inside the lungs, which --frame hilum is for: give a basis "
-      "made by 'supine embed', or use 'supine deform --frame hilum'",
-      c->path);
+  const char *const frame = wanted->frame.points != NULL ? "POINTS" : "hilum";
+  const bool in_frame = wanted->frame.hilum || wanted->frame.points != NULL;
+  SUPINE_REFUSE_IF(!content && in_frame, error, SUPINE_ERROR_ARGUMENT,
+                   "%s holds no structures inside the lungs, which --frame %s is for: give a basis "
+                   "made by 'supine embed', or use 'supine deform --frame %s'",
+                   c->path, frame, frame);
   return content ? compare_content(c, wanted, error) : report(c, wanted, error);
 }
 

@@ -23,7 +23,7 @@ typedef struct request {
   supine_volume_options volume;
   supine_from from;
   bool as_scanned;
-  int frame; /* 1 if the hilum stays in place, 0 if the body does */
+  supine_frame frame;
   supine_deform_content content;
   const char *states; /* CSV file of states; NULL if the options give one state */
   /* Outputs in the columns output, labels and field of a row; the request owns these texts. */
@@ -50,17 +50,25 @@ static const supine_option table[] = {
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
-    {.table = supine_options_hilum_frame, SUPINE_FILLS(request, frame)},
+    {.table = supine_options_fiducials_frame, SUPINE_FILLS(request, frame)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_command_deform_content_options, SUPINE_FILLS(request, content)},
     {.name = NULL}};
+
+static const char *frame_of(const supine_frame *frame) {
+  if (frame->points != NULL) {
+    return ", after a rigid registration at points";
+  }
+  return frame->hilum ? ", in the frame of the hilum" : "";
+}
 
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
-                              .subtract_hilum = wanted->frame == 1};
+                              .subtract_hilum = wanted->frame.hilum,
+                              .registered = wanted->frame.points != NULL};
   static const char simulator[] = "expected_error_mm: of the fit to the other simulator, RMS over "
                                   "runs left out; ";
   const char *by = "";
@@ -70,9 +78,14 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
   SUPINE_TRY(supine_posed_errors(basis, &moved.state, &moved.from.state, &errors, error));
-  SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame == 1,
+  SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame.hilum,
                                   &moved.hilum, error));
-  if (wanted->frame == 1) {
+  if (wanted->frame.points != NULL) {
+    const supine_state *states[2] = {&moved.state, &moved.from.state};
+    SUPINE_TRY(supine_options_fiducials(wanted->frame.points, basis, states, &errors, moved.motion,
+                                        error));
+  }
+  if (wanted->frame.hilum) {
     const supine_state scan = supine_basis_scan(basis);
     SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &scan, &errors.position, error));
     SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &errors.moved,
@@ -85,7 +98,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   moved.errors = errors;
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s%s", moved.from.name,
-                 wanted->frame == 1 ? ", in the frame of the hilum" : "", by, caveats);
+                 frame_of(&wanted->frame), by, caveats);
   moved.save.comment = comment;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
   return supine_command_deform_content(&wanted->content, basis, &moved, error);

@@ -2,6 +2,7 @@
 /* Write deformed surfaces, displacement fields, moved images, and a CSV file of moved points. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/arena.h"
 #include "base/csv.h"
@@ -195,6 +196,11 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       supine_options_target_shift(&rows[i], moved->hilum.move);
     }
   }
+  if (moved->registered) {
+    for (size_t i = 0; i < count; ++i) {
+      supine_options_fiducials_target(moved->motion, &rows[i]);
+    }
+  }
   print_rows(moved, basis, rows, count, output.file);
   SUPINE_TRY(supine_output_commit(&output, error));
   char state[160];
@@ -360,8 +366,8 @@ static supine_status check_images(const supine_deform_content *wanted, const sup
   supine_status status = SUPINE_OK;
   for (size_t i = 0; i < sizeof images / sizeof *images && status == SUPINE_OK; ++i) {
     if (images[i].path != NULL) {
-      status = supine_warp_check_image(field, images[i].image, images[i].path,
-                                       images[i].kind, &findings, error);
+      status = supine_warp_check_image(field, images[i].image, images[i].path, images[i].kind,
+                                       &findings, error);
     }
   }
   supine_options_say_findings("deform", &findings);
@@ -447,6 +453,25 @@ static supine_status tell_folds(const supine_basis *basis, const supine_mesh *fr
   return SUPINE_OK;
 }
 
+/* Move two meshes, and the normals of the second one, by the motions of a registration. */
+static void register_mesh(const supine_motion motion[2], supine_mesh *from, supine_mesh *mesh,
+                          float *normals) {
+  supine_motion turn = motion[0];
+  memset(turn.translation, 0, sizeof turn.translation);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    double normal[3];
+    supine_options_fiducials_move(&motion[0], mesh->vertices + 3 * i);
+    supine_options_fiducials_move(&motion[1], from->vertices + 3 * i);
+    for (size_t k = 0; k < 3; ++k) {
+      normal[k] = (double)normals[3 * i + k];
+    }
+    supine_options_fiducials_move(&turn, normal);
+    for (size_t k = 0; k < 3; ++k) {
+      normals[3 * i + k] = (float)normal[k];
+    }
+  }
+}
+
 /* Write a surface, and print its largest displacement and its volume. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    supine_deformation *moved, supine_error *error) {
@@ -471,6 +496,9 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
     for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {
       mesh.vertices[i] -= moved->hilum.move[i % 3];
     }
+  }
+  if (moved->registered) {
+    register_mesh(moved->motion, &from, &mesh, normals);
   }
   (void)supine_basis_volumes(basis, &moved->pose, volumes);
   save->from = from.vertices;
@@ -504,6 +532,9 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                                             const supine_basis *basis, supine_deformation *moved,
                                             supine_error *error) {
   const bool image = wanted->image != NULL || wanted->labels != NULL;
+  SUPINE_REFUSE_IF(moved->registered && (image || wanted->field != NULL), error,
+                   SUPINE_ERROR_UNSUPPORTED,
+                   "--frame POINTS moves points and surfaces, no images: write these without it");
   if (image || wanted->field != NULL) {
     SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
@@ -528,6 +559,12 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
                          displacement->rms, displacement->largest,
                          displacement->turned ? "; an extrapolation, as the posture changes" : "");
     }
+  }
+  if (moved->registered) {
+    (void)puts(
+        "registered at the points of --frame: positions, displacements and errors are what is "
+        "left after it");
+    return SUPINE_OK;
   }
   if (supine_length(moved->hilum.move) > 0.0 && supine_length(moved->hilum.move) < 0.1) {
     (void)puts("the hilum moves by less than 0.1 mm");

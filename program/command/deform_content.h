@@ -9,6 +9,7 @@
 #include "precompute/warp/tissue.h"
 
 #include "program/options/basis_input.h"
+#include "program/options/fiducials.h"
 #include "program/options/hilum.h"
 #include "program/options/state_options.h"
 
@@ -49,6 +50,8 @@ typedef struct supine_deformation {
   supine_errors errors;               /* of positions, and of displacements from `from` */
   supine_hilum hilum;
   bool subtract_hilum;           /* whether outputs are in the frame of the hilum */
+  bool registered;               /* whether outputs are after a registration at points */
+  supine_motion motion[2];       /* of that: for the state, and for `from` */
   supine_mesh_save_options save; /* axes, unit and comment of the output */
 } supine_deformation;
 

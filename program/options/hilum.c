@@ -9,15 +9,6 @@
 #include "program/options/hilum.h"
 #include "runtime/expected.h"
 
-static const char *const frames[] = {"body", "hilum", NULL};
-
-const supine_option supine_options_hilum_frame[] = {
-    {"frame", 0, "body|hilum",
-     "what stays in place: the body (spine, apex and back wall), or the hilum, whose displacement "
-     "is then subtracted, as bronchoscopy registers the airways there",
-     .kind = SUPINE_OPTION_CHOICE, .size = sizeof(int), .choices = frames, .standard = "body"},
-    {.name = NULL}};
-
 /* Prepare the formula of the expected error between two states, with the hila as anchors. If the
  * file does not say how the hilum moves, fail if it is needed; else write no anchors. */
 static supine_status prepare(const supine_basis *basis, const supine_state *state,

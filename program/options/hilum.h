@@ -5,12 +5,6 @@
 
 #include "precompute/posed/posed.h"
 
-#include "program/options/command.h"
-
-/* Option table that holds only --frame, which sets an int: 1 to subtract the displacement of the
- * hilum, else 0. */
-extern const supine_option supine_options_hilum_frame[];
-
 /* Displacement of the hilum between two states. */
 typedef struct supine_hilum {
   double move[3];  /* LPS, mm; 0 if the file does not say how the hilum moves */
