@@ -127,6 +127,12 @@ int main(int argc, char **argv) {
     return SUPINE_EXIT_USAGE;
   }
   const char *name = argv[1];
+  if (strcmp(name, "help") == 0 && argc > 2) { /* "supine help deform" */
+    char help[] = "--help";
+    char *words[] = {argv[2], help, NULL};
+    const supine_command *about = find_command(argv[2]);
+    return about == NULL ? SUPINE_EXIT_USAGE : supine_options_run(about, 2, words);
+  }
   if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || strcmp(name, "help") == 0) {
     print_help();
     return supine_options_finish("help");
