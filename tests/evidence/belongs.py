@@ -7,20 +7,18 @@
 BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, LOBES
 are label maps of the lobes of further people. Prints, for docs/inputs.md, the share of the vertices of own and of
 others' lungs and lobes that lie more than 5 mm and an edge outside the surface of a basis and not between the lungs;
-how far the backs of two lungs are apart; and of CTs made from the label maps (-850 and 30 HU), the share of the lungs
-without air, and the largest share of soft tissue of a lung that `deform --density` finds. Needs nibabel; exit code 77:
-no data."""
+how far the backs of two lungs are apart; and the share of the lungs that is no lung, hence without air, in the own CT,
+in the same 12 and 30 mm off, in the exhaled one, and in others'. Needs nibabel; exit code 77: no data."""
 import glob
 import itertools
 import os
-import re
 import subprocess
 import sys
 import tempfile
 
 import numpy as np
 
-from person import spread, tensors
+from person import tensors
 
 FAST = ("--law", "paper", "--band", "3", "--held-out", "5")
 
@@ -65,37 +63,34 @@ def contents(supine, maps):
     show("backs apart / depth", [a / b for a, b in (apart(tensors(made[6, i])) for i in range(len(maps)))])
 
 
-class Scan:
-    """A person's inhaled scan, with the grid of a basis, and CTs in it."""
+def read_mask(path):
+    """Return every third voxel of a label map, and its affine matrix, mm."""
+    import nibabel
+    image = nibabel.load(path)
+    return np.asarray(image.dataobj)[::3, ::3, ::3] > 0, image.affine @ np.diag([3, 3, 3, 1])
 
-    def __init__(self, supine, copd, person):
-        self.supine, self.copd, self.person = supine, copd, person
-        path = f"{copd}/{person}_insp.nii.gz"
-        run(supine, "precompute", path, "--edge", "8", "--held-out", "5", "-o", person + ".st")
-        run(supine, "embed", person + ".st", "--grid", "10", "-o", person + "_grid.st")
-        surface, self.grid = tensors(person + ".st"), tensors(person + "_grid.st")
-        self.volumes = [spread(surface["vertices"].astype(float), surface["triangles"][
-            surface["lung"][surface["triangles"][:, 0]] == lung])[0] for lung in (0, 1)]
 
-    def look(self, other, state="insp", shift=0.0):
-        """Return the shares without air and of soft tissue of the CT of a person, in the middle of the own scan."""
-        import nibabel
-        own, mask = (nibabel.load(f"{self.copd}/{p}_{s}.nii.gz") for p, s in ((self.person, "insp"), (other, state)))
-        image = np.where(np.asarray(mask.dataobj) > 0, -850, 30).astype(np.int16)
-        affine = mask.affine.copy()
-        if other != self.person or state != "insp":  # scans have frames of their own: their centres meet
-            centre = lambda scan: scan.affine @ np.append(np.argwhere(np.asarray(scan.dataobj) > 0).mean(0), 1)
-            affine[:, 3] += (centre(own) - centre(mask)) * [1, 1, 1, 0]
-        affine[2, 3] += shift
-        nibabel.save(nibabel.Nifti1Image(image, affine), "ct.nii.gz")
-        nodes = self.grid["vertices"][self.grid["depth"] > 3] * [-1, -1, 1]
-        at = np.rint((nodes - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T).astype(int)
-        at = at[((at >= 0) & (at < image.shape)).all(1)]
-        said = run(self.supine, "deform", self.person + "_grid.st", "--posture", "prone:rest", "--image", "ct.nii.gz",
-                   "--density", "-o", "moved.nii.gz", check=False)
-        soft = re.search("soft tissue in the lungs: left ([0-9.]+) mL, right ([0-9.]+) mL", said)
-        most = max(float(soft.group(k + 1)) / self.volumes[k] for k in (0, 1)) if soft else np.nan
-        return (image[tuple(at.T)] > -300).mean(), most
+def airless(lungs, other, shift=0.0):
+    """Return the share of lungs, 3 mm below their surface, that is no lung in another scan with the same centre."""
+    from scipy.ndimage import distance_transform_edt
+    (mask, affine), (seen, there) = lungs, other
+    place = lambda voxels, matrix: voxels @ matrix[:3, :3].T + matrix[:3, 3]
+    deep = place(np.argwhere(distance_transform_edt(mask, abs(np.diag(affine)[:3])) > 3), affine)
+    moved = np.zeros(3)
+    if lungs is not other:
+        moved = deep.mean(0) - place(np.argwhere(seen), there).mean(0)
+    at = np.rint((deep - moved - [0, 0, shift] - there[:3, 3]) @ np.linalg.inv(there[:3, :3]).T).astype(int)
+    return 1 - seen[tuple(at[((at >= 0) & (at < seen.shape)).all(1)].T)].mean()
+
+
+def images(copd, people):
+    """Show how much of the lungs has no air in their own CT, in this CT moved, and in that of another person."""
+    full, rest = ([read_mask(f"{copd}/{p}_{state}.nii.gz") for p in people] for state in ("insp", "exp"))
+    show("own CT, without air", [airless(scan, scan) for scan in full])
+    for shift in (12, 30, -30):
+        show(f"own CT {shift} mm off, without air", [airless(scan, scan, shift) for scan in full])
+    show("own exhaled CT, without air", [airless(scan, other) for scan, other in zip(full, rest)])
+    show("CT of others, without air", [airless(a, b) for a, b in itertools.permutations(full, 2)])
 
 
 def main(build, copd, *lobes):
@@ -108,15 +103,7 @@ def main(build, copd, *lobes):
         os.chdir(folder)
         contents(supine, [(f"{copd}/{p}_insp.nii.gz", "1", ()) for p in people] +
                  [(path, "all", ("--labels", "lobes")) for path in lobes])
-        scans = [Scan(supine, copd, person) for person in people]
-        for title, look in (("own CT", lambda s: [s.look(s.person)]),
-                            ("own CT 12 mm off", lambda s: [s.look(s.person, shift=12)]),
-                            ("own CT 30 mm off", lambda s: [s.look(s.person, shift=30)]),
-                            ("own exhaled CT", lambda s: [s.look(s.person, "exp")]),
-                            ("CT of others", lambda s: [s.look(p) for p in people if p != s.person])):
-            airless, soft = zip(*sum(map(look, scans), []))
-            show(title + ", without air", airless)
-            show(title + ", soft tissue", soft)
+        images(copd, people)
 
 
 if __name__ == "__main__":
