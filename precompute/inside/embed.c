@@ -567,9 +567,9 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   SUPINE_TRY(
       supine_arena_check(&arena, error, "%zu points, each with %zu coefficients", n, columns));
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
+  check_belonging(&e, &report->findings); /* before rigid parts are counted as of one lung */
   gather_parts(&e);
   SUPINE_TRY(check_distance(&e, error));
-  check_belonging(&e, &report->findings);
   SUPINE_TRY(supine_inside_anatomy(shells, content, e.anatomy, error));
   SUPINE_TRY(sort_points(&e, report, error));
   for (size_t lung = 0, begin = 0; lung < shells->count; begin += report->in_lung[lung++]) {
