@@ -49,7 +49,9 @@ void supine_posed_expected_measure(size_t count, supine_expected *expected) {
   expected->largest = 0.0;
   for (size_t i = 0; i < count; ++i) {
     square += (double)expected->sigma[i] * (double)expected->sigma[i];
-    another += (double)expected->another[i] * (double)expected->another[i];
+    if (expected->another != NULL) {
+      another += (double)expected->another[i] * (double)expected->another[i];
+    }
     expected->largest = fmax(expected->largest, (double)expected->sigma[i]);
   }
   expected->rms = sqrt(square / (double)count);
@@ -105,7 +107,9 @@ supine_status supine_posed_simulator_error(const supine_basis *basis, const supi
   if (expected->sigma == NULL) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  return supine_expected_error(basis, state, NULL, expected->sigma, error);
+  SUPINE_TRY(supine_expected_error(basis, state, NULL, expected->sigma, error));
+  supine_posed_expected_measure(n, expected);
+  return SUPINE_OK;
 }
 
 void supine_posed_errors_free(supine_errors *errors) {

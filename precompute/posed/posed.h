@@ -51,8 +51,8 @@ supine_status supine_posed_errors(const supine_basis *basis, const supine_state 
                                   const supine_state *from, supine_errors *errors,
                                   supine_error *error);
 
-/* Write `sigma` of a basis of another simulator's fields: the error of the fit to the simulator,
- * not to a person. The other members are unchanged, and all are if the basis lacks these errors. */
+/* Write `sigma`, `rms` and `largest` of a basis of another simulator's fields: the error of the fit
+ * to the simulator, not to a person. All are unchanged if the basis lacks these errors. */
 supine_status supine_posed_simulator_error(const supine_basis *basis, const supine_state *state,
                                            supine_expected *expected, supine_error *error);
 void supine_posed_errors_free(supine_errors *errors);

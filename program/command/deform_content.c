@@ -547,7 +547,11 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
   }
   const supine_expected *position = &moved->errors.position;
   const supine_expected *displacement = &moved->errors.moved;
-  if (position->sigma != NULL) {
+  if (position->another == NULL && position->sigma != NULL) { /* another simulator's fields */
+    (void)supine_print(stdout, "error of the fit to the simulator: %s mm (RMS over the points)\n",
+                       supine_text_distance(position->rms).text);
+  }
+  if (position->another != NULL) {
     (void)supine_print(stdout,
                        "expected error of the positions: same session %.1f mm (RMS over the "
                        "points), %.1f mm at most; another day %.1f mm%s\n",

@@ -925,6 +925,8 @@ TEST(test_precompute_fields_scanned_posture_not_displaced) {
   assert_says(ply, "property float expected_error_mm");
   assert_says(ply, "expected_error_mm: of the fit to the other simulator");
   assert_null(strstr(ply, "moved_error_mm"));
+  assert_says(printed, "error of the fit to the simulator: ");
+  assert_null(strstr(printed, "same session"));
   free(ply);
   EXPECT(0, "displacement, mm", "compare b.safetensors --postures supine,prone");
   assert_null(strstr(printed, "breath"));
