@@ -129,6 +129,21 @@ def transform(matrix=(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0), status="OK"):
     return struct.pack(">H12s20sQQQ", 2, b"TRANSFORM", b"Patient", 0, len(body), crc64(body)) + body
 
 
+def message(kind, device, body):
+    """Return an OpenIGTLink message."""
+    return struct.pack(">H12s20sQQQ", 1, kind, device, 0, len(body), crc64(body)) + body
+
+
+def volume_text(text):
+    """Return the message that gives the volume as a text."""
+    return message(b"STRING", b"VOLUME", struct.pack(">HH", 3, len(text)) + text.encode())
+
+
+def volume_number(ml):
+    """Return the message that gives the volume above rest as a number."""
+    return message(b"NDARRAY", b"VOLUME", struct.pack(">BBHd", 11, 1, 1, ml))
+
+
 def stream(basis, *words, message=None):
     """Run the live lungs, send a message if there is one, and stop them when they have read it, or sent a frame."""
     with subprocess.Popen([SUPINE, "stream", basis, "--listen", "0", *words], stdout=subprocess.PIPE,
@@ -146,7 +161,7 @@ def stream(basis, *words, message=None):
                     pass
         server.terminate()
         said = "".join(server.communicate(timeout=60))
-    if re.search(r"refused: [1-9]", said):
+    if re.search(r"refused: [1-9]|volume is refused", said):
         return "refused", said
     return ("told" if re.search(r"(repaired|as invalid): [1-9]|warning:", said) else "taken"), said
 
