@@ -6,6 +6,7 @@ import contextlib
 import copy
 import fcntl
 import os
+import re
 import select
 import subprocess
 import tempfile
@@ -86,8 +87,9 @@ def _in_memory(stack: contextlib.ExitStack, folder: str, name: str, *parts: Any)
 class _Pipe:
     """Reads the images that the program writes one after another."""
 
-    def __init__(self, path: str, process: subprocess.Popen[bytes], said: Any) -> None:
-        self.fd, self.process, self.said = os.open(path, os.O_RDWR), process, said
+    def __init__(self, folder: str, process: subprocess.Popen[bytes], said: Any) -> None:
+        self.folder, self.process, self.said = folder, process, said
+        self.fd = os.open(os.path.join(folder, "pipe"), os.O_RDWR)
         fcntl.fcntl(self.fd, fcntl.F_SETPIPE_SZ, 1 << 20)
 
     def read(self, data: NDArray[Any]) -> NDArray[Any]:
@@ -96,9 +98,14 @@ class _Pipe:
             if select.select([self.fd], [], [], 0.1)[0]:
                 at += os.readv(self.fd, [view[at:at + (1 << 20)]])
             elif self.process.poll() is not None and not select.select([self.fd], [], [], 0)[0]:
-                self.said.seek(0)
-                _program.fail("deform", self.process.returncode, self.said.read().decode(errors="replace"))
+                _program.fail("deform", self.process.returncode, self.heard())
         return data
+
+    def heard(self) -> str:
+        """Return what the program has said, of `image` and `labels` instead of their files. It goes on writing to the
+        same file, whose position must stay."""
+        said = os.pread(self.said.fileno(), 1 << 20, 0).decode(errors="replace")
+        return re.sub(re.escape(self.folder) + r"/(\w+)\.nrrd", r"\1", said)
 
     def image(self) -> NDArray[Any]:
         """Read a NIfTI image [z, y, x], or [3, z, y, x] for a field."""
@@ -169,11 +176,13 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said)
         stack.callback(process.wait)
         stack.callback(process.terminate)
-        pipe = _Pipe(os.path.join(folder, "pipe"), process, said)
+        pipe = _Pipe(folder, process, said)
         stack.callback(os.close, pipe.fd)
-        for state in wanted:
+        for i, state in enumerate(wanted):
             field = np.ascontiguousarray(np.moveaxis(pipe.image(), 0, -1))
             moved = {name: pipe.image() for name, array in given.items() if array is not None}
+            if i == 0:
+                _program.warn(_program.warnings_of("deform", pipe.heard()))
             error = np.full(shape, np.nan, np.float32)
             error[place[:, 2], place[:, 1], place[:, 0]] = nodes.expected_error(state)
             yield Sample(state, moved.get("image"), moved.get("labels"),

@@ -189,6 +189,11 @@ def warn(messages: Sequence[str]) -> None:
         warnings.warn(message, stacklevel=level + 1)
 
 
+def warnings_of(command: str, said: str) -> list[str]:
+    """Return the warnings in what a command wrote to standard error."""
+    return [_own_names(text) for text in re.findall(rf"^supine {command}: warning: (.*)$", said, re.M)]
+
+
 def run(command: str, operands: Sequence[str], options: dict[str, Any], names: dict[str, str],
         progress: Optional[Progress]) -> str:
     """Run a command and return its standard output. Its warnings become Python warnings. Its errors become exceptions
@@ -214,10 +219,9 @@ def run(command: str, operands: Sequence[str], options: dict[str, Any], names: d
         text = report.read().decode(errors="replace")
     for path, name in names.items():
         said, text = said.replace(path, name), text.replace(path, name)
-    messages = re.sub(rf"^supine {command}: ", "", said, flags=re.M).splitlines()
-    warn([_own_names(message[9:]) for message in messages if message.startswith("warning: ")])
+    warn(warnings_of(command, said))
     if status != 0:
-        fail(command, status, "\n".join(messages))
+        fail(command, status, said)
     if progress is not None:
         progress(1.0)
     return text
