@@ -624,7 +624,7 @@ static supine_status prepare(const check *c, supine_basis *basis,
     return supine_error_set(
         c->error, SUPINE_ERROR_UNSUPPORTED,
         options->simd == SUPINE_SIMD_AUTO
-            ? "the environment variable SUPINE_SIMD names no instruction set of this processor or "
+            ? "SUPINE_SIMD names no instruction set of this processor or "
               "build: set it to portable, avx2 or avx512, or unset it"
             : "this processor or build lacks the instruction set: choose SUPINE_SIMD_AUTO");
   }
@@ -745,11 +745,10 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
   const check c = {file, name, error};
   SUPINE_TRY(check_metadata(&c, &basis->info));
   static supine_status (*const steps[])(const check *, supine_basis *) = {
-      check_numbers, check_surface,   check_field,     check_modes, check_lungs,
-      check_weights, check_volume,    check_reference, check_rest,  check_range,
-      check_scan,    check_simulated, check_normals,   check_rigid, check_expected,
-      check_errors,  check_collapse,  check_names,     check_vertex_errors,
-      identify};
+      check_numbers, check_surface,   check_field,     check_modes,         check_lungs,
+      check_weights, check_volume,    check_reference, check_rest,          check_range,
+      check_scan,    check_simulated, check_normals,   check_rigid,         check_expected,
+      check_errors,  check_collapse,  check_names,     check_vertex_errors, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

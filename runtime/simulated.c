@@ -315,8 +315,7 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
       break;
     default:
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "volume kind %d has no meaning here: use another value of "
-                              "supine_volume_kind",
+                              "volume kind %d is unknown: use a value of supine_volume_kind",
                               (int)kind);
     }
   }
