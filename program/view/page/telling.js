@@ -63,7 +63,8 @@ function tellSettled(now) {
 /** Return how far the surface has moved, in words. */
 function surfaceWords({ mean, p95, largest, error }) {
   if (largest < 0.05) return `This is ${state.from.name}.`;
-  const stated = error === null ? '' : `; ${errorName(basis)} ${errorText(error)}`;
+  const rounded = error < 0.05 ? 'below 0.05' : error?.toFixed(1);
+  const stated = error === null ? '' : `; ${errorName(basis)} ${rounded} mm`;
   const most = `95 % within ${p95.toFixed(1)}, at most ${largest.toFixed(1)}${stated}`;
   return `${mean.toFixed(1)} mm on average from ${state.from.name}, ${most}.`;
 }
