@@ -18,6 +18,7 @@ static class Deform
     {
         public int status;
         [MarshalAs(UnmanagedType.ByValArray, SizeConst = 512)] public byte[] message;
+        [MarshalAs(UnmanagedType.ByValArray, SizeConst = 172)] public byte[] remedies; // which this program does not use
     }
 
     [DllImport(Library)] static extern int supine_basis_open([MarshalAs(UnmanagedType.LPUTF8Str)] string path,

@@ -91,9 +91,9 @@ turns points --landmarks full.csv --rest 2885mL --other 6000mL --state prone:res
 turns reversed --landmarks empty.csv --rest 6000mL --other 2885mL \
   --state prone:rest:down.csv
 grep -q 'state *supine:full' fit.txt || fail "the states are not stated: $(cat fit.txt)"
-"$supine" info points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
-  fail "info does not name the patient: $("$supine" info points.safetensors)"
-"$supine" info points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
+"$supine" info --all points.safetensors | grep -q 'patient *somebody: deep law.* held-out residual' ||
+  fail "info does not name the patient: $("$supine" info --all points.safetensors)"
+"$supine" info --all points.safetensors | grep -q 'patient.* expected error [0-9.]* mm RMS' ||
   fail "info does not state the fit's error"
 
 # chain SCAN MESH [VOLUME ALLOWED]...: make a basis of SCAN and the patient model in surface.json. Check that it predicts

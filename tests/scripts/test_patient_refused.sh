@@ -42,7 +42,7 @@ changed() {
   awk -F, -v OFS=, "NR == 1 { print; next } { $2; print }" good.csv >"$1.csv"
 }
 changed apart '$4 += 150; $5 += 150; $6 += 150'
-refused 2 'mm apart: give all points in one coordinate frame, or fit the motion between the scans with --translation' --landmarks apart.csv
+refused 2 'mm apart: give all points in one coordinate frame, or fit the motion between the scans; give --translation' --landmarks apart.csv
 "$supine" fit --landmarks apart.csv --translation --rest 2600mL --other 5400mL >/dev/null || fail "fit --translation refuses shifted landmarks"
 changed beyond '$6 += 5000'
 refused 2 'mm apart: give all points in one coordinate frame' --landmarks beyond.csv
