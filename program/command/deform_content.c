@@ -312,14 +312,15 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
   supine_warp_residual residual = {0};
   SUPINE_TRY(supine_warp_invert(forward, inverse, &residual, error));
-  (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs",
+  (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs\n",
                supine_text_distance(residual.rms).text,
                supine_text_distance(residual.largest).text);
   if (residual.lost > 0) {
-    (void)printf("; the field folds and has no inverse at %zu %s", residual.lost,
-                 residual.lost == 1 ? "node" : "nodes");
+    supine_options_say("deform",
+                       "warning: the field folds and has no inverse at %zu of its nodes inside the "
+                       "lungs: voxels are wrong there",
+                       residual.lost);
   }
-  (void)putchar('\n');
   return SUPINE_OK;
 }
 
