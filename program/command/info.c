@@ -102,42 +102,52 @@ static void add_content(json_t *root, const supine_basis *basis) {
   (void)json_object_set_new(root, "embedded", counts);
 }
 
-/* Add the expected errors, if known, and their terms, of two displacements: from the scan to
- * supine, and from the scan to prone, both at the default volume. Return SUPINE_OK or
- * SUPINE_ERROR_MEMORY.
- */
-static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
+/* Add the terms of the expected error of a state to a list. */
+static void add_terms(json_t *terms, const supine_basis *basis, const supine_state *state,
+                      const char *text) {
   const supine_state scan = supine_basis_scan(basis);
+  supine_expected_part parts[SUPINE_EXPECTED_TERMS];
+  (void)supine_expected_parts(basis, state, &scan, parts, NULL);
+  for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
+    if (parts[k].rms > 0.0) {
+      (void)json_array_append_new(terms, json_pack("{s:s, s:s, s:f, s:s}", "state", text, "term",
+                                                   parts[k].name, "rms_mm", parts[k].rms, "source",
+                                                   parts[k].source));
+    }
+  }
+}
+
+/* Add the expected error of the positions in a state, and its terms, to two lists, if known. Return
+ * SUPINE_OK or SUPINE_ERROR_MEMORY. */
+static supine_status add_state(json_t *rows, json_t *terms, const supine_basis *basis,
+                               const supine_state *state, supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  supine_expected expected = {0};
+  const supine_status status = supine_posed_expected(basis, state, &scan, &expected, error);
+  if (status == SUPINE_OK && expected.largest > 0.0) {
+    char text[160];
+    (void)supine_state_describe(state, text, sizeof text);
+    (void)json_array_append_new(
+        rows, json_pack("{s:s, s:f, s:f, s:f, s:b}", "state", text, "rms_mm", expected.rms,
+                        "largest_mm", expected.largest, "another_day_mm", expected.another_rms,
+                        "extrapolated", (int)expected.turned));
+    add_terms(terms, basis, state, text);
+  }
+  supine_posed_expected_free(&expected);
+  return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
+}
+
+/* Add the expected errors of positions, and their terms, in supine and prone posture at the default
+ * volume. Return SUPINE_OK or SUPINE_ERROR_MEMORY. */
+static supine_status add_expected(json_t *root, const supine_basis *basis, supine_error *error) {
   json_t *rows = json_array();
   json_t *terms = json_array();
-  supine_status status = SUPINE_OK;
-  for (int prone = 0; prone < 2 && status != SUPINE_ERROR_MEMORY; ++prone) {
-    const supine_state state = {.gravity = {0.0, prone == 1 ? -1.0 : 1.0, 0.0},
-                                .volume = supine_basis_default_volume(basis)};
-    supine_expected expected = {0};
-    supine_expected_part parts[SUPINE_EXPECTED_TERMS];
-    char text[160];
-    status = supine_posed_expected(basis, &state, &scan, &expected, error);
-    if (status == SUPINE_OK && expected.largest > 0.0) {
-      (void)supine_state_describe(&state, text, sizeof text);
-      (void)json_array_append_new(
-          rows, json_pack("{s:s, s:f, s:f, s:f, s:b}", "state", text, "rms_mm", expected.rms,
-                          "largest_mm", expected.largest, "another_day_mm", expected.another_rms,
-                          "extrapolated", (int)expected.turned));
-      (void)supine_expected_parts(basis, &state, &scan, parts, NULL);
-      for (size_t k = 0; k < SUPINE_EXPECTED_TERMS; ++k) {
-        if (parts[k].rms > 0.0) {
-          (void)json_array_append_new(terms, json_pack("{s:s, s:s, s:f, s:s}", "state", text,
-                                                       "term", parts[k].name, "rms_mm",
-                                                       parts[k].rms, "source", parts[k].source));
-        }
-      }
-    }
-    supine_posed_expected_free(&expected);
-  }
+  supine_state state = {.gravity = {0.0, 1.0, 0.0}, .volume = supine_basis_default_volume(basis)};
   (void)json_object_set_new(root, "expected_error", rows);
   (void)json_object_set_new(root, "expected_error_terms", terms);
-  return status == SUPINE_ERROR_MEMORY ? status : SUPINE_OK;
+  SUPINE_TRY(add_state(rows, terms, basis, &state, error));
+  state.gravity[1] = -1.0;
+  return add_state(rows, terms, basis, &state, error);
 }
 
 /* Add a list of compression errors: "error_harmonics" by band, "error_modes" by number of modes. */
@@ -220,8 +230,8 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 /* What the text begins with: what the basis is, how sure, and what is assumed. */
-static const char *const first[] = {"file",    "lungs",          "made_by",  "expected_error",
-                                    "facts",   "resting_shares", "warnings", "embedded"};
+static const char *const first[] = {"file",  "lungs",          "made_by",  "expected_error",
+                                    "facts", "resting_shares", "warnings", "embedded"};
 
 /* Put what matters into the order of the text, and add the rest if it is wanted. Free `described`.
  */
