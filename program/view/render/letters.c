@@ -87,30 +87,27 @@ double supine_render_letters_width(cairo_t *cr, const letters *face, const char 
   return (double)width / PANGO_SCALE;
 }
 
-void supine_render_letters_show(cairo_t *cr, const letters *face, double x, double y,
-                                const char *words) {
+/* Show a line of text, or append its outline to the current path. */
+static void put(cairo_t *cr, const letters *face, double x, double y, const char *words,
+                bool shown) {
   PangoLayout *line = layout_of(cr, face, words);
   if (line == NULL) {
     select_face(cr, face);
     cairo.move_to(cr, x, y);
-    cairo.show_text(cr, words);
+    (shown ? cairo.show_text : cairo.text_path)(cr, words);
     return;
   }
   cairo.move_to(cr, x, y - (double)pango.layout_get_baseline(line) / PANGO_SCALE);
-  pangocairo.show_layout(cr, line);
+  (shown ? pangocairo.show_layout : pangocairo.layout_path)(cr, line);
   object.unref(line);
+}
+
+void supine_render_letters_show(cairo_t *cr, const letters *face, double x, double y,
+                                const char *words) {
+  put(cr, face, x, y, words, true);
 }
 
 void supine_render_letters_path(cairo_t *cr, const letters *face, double x, double y,
                                 const char *words) {
-  PangoLayout *line = layout_of(cr, face, words);
-  if (line == NULL) {
-    select_face(cr, face);
-    cairo.move_to(cr, x, y);
-    cairo.text_path(cr, words);
-    return;
-  }
-  cairo.move_to(cr, x, y - (double)pango.layout_get_baseline(line) / PANGO_SCALE);
-  pangocairo.layout_path(cr, line);
-  object.unref(line);
+  put(cr, face, x, y, words, false);
 }
