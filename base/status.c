@@ -81,7 +81,7 @@ static void write_argument(const supine_remedy *remedy, supine_words words, char
   }
 }
 
-/* Write what to do with an argument. */
+/* Write one remedy, such as "give --axes LPS" or "leave --clamp out". */
 static void write_remedy(const supine_remedy *remedy, supine_words words, char *text, size_t size) {
   char argument[128];
   char example[SUPINE_REMEDY_VALUE_MAX + 16] = "";

@@ -113,7 +113,7 @@ static bool can_hold(const supine_basis *basis, const supine_state *state, const
   return true;
 }
 
-/* Advise on a pose that lungs cannot hold. */
+/* Add to the error of a pose that lungs cannot hold how it can be allowed. */
 static supine_status advise_folds(supine_error *error) {
   const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_allow_folds()};
   return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);

@@ -154,7 +154,7 @@ int supine_kriging_column(size_t term, size_t axis, double *sign);
  * @return whether the points' covariance is positive definite */
 bool supine_kriging_add_lines(supine_kriging *fit, double *scratch);
 
-/** Take what is fitted along the lines out of `weights`. */
+/** Subtract from `weights` what the fitted positions of the points along their lines contribute. */
 void supine_kriging_weigh_lines(supine_kriging *fit, double *scratch);
 
 /** Compute G^-1 D' (weights e_a) for the unit vector e_a of each axis; G and D as in
