@@ -149,10 +149,10 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
     SUPINE_TRY(supine_patient_pairs_load(landmarks, wanted->landmarks.reverse, &pairs, error));
     SUPINE_TRY(supine_options_drop_mismatched(name, landmarks, &pairs, error));
   }
-  SUPINE_TRY(tell_other_person(s, i, path != NULL ? &lungs : NULL,
-                               landmarks != NULL ? &pairs : NULL, error));
-  return supine_validation_compare(s, i, path != NULL ? &lungs.mesh : NULL,
-                                   landmarks != NULL ? &pairs : NULL, error);
+  const supine_lungs *scan = path != NULL ? &lungs : NULL;
+  const supine_patient_pairs *given = landmarks != NULL ? &pairs : NULL;
+  SUPINE_TRY(tell_other_person(s, i, scan, given, error));
+  return supine_validation_compare(s, i, scan != NULL ? &scan->mesh : NULL, given, error);
 }
 
 static supine_status validate(const request *wanted, supine_validation *s, supine_error *error) {

@@ -4,11 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <supine/facts.h>
-
 #include "base/arena.h"
 #include "base/locale.h"
 
+#include "program/options/facts.h"
 #include "program/view/export/export.h"
 #include "program/view/export/packed.h"
 #include "program/view/export/template.h"
@@ -411,7 +410,7 @@ supine_status supine_export_html_print(FILE *file, const supine_basis *basis,
   }
   json_auto_t *description = describe(&p);
   char *text = json_dumps(description, JSON_COMPACT);
-  char caveats[1200];
+  char caveats[SUPINE_CAVEATS_SIZE];
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   json_auto_t *data =
       json_pack("{s:O, s:s, s:s, s:O, s:b, s:O?}", "title", json_object_get(description, "title"),

@@ -192,7 +192,6 @@ function writeOnce() {
   write('ghost-name', 'Ghost of the reference');
   write('patient-fit', basis.metadata.patient ? `fitted to this patient: ${basis.metadata.patient}` : '');
   write('state', originWords());
-  write('caveats', basis.library.caveats);
   $('credit').hidden = !basis.metadata.attribution;
   write('credit', `Lungs: ${basis.metadata.attribution}`);
   $('inside').disabled = !inside;
