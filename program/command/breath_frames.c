@@ -23,14 +23,14 @@ typedef struct playing {
   const supine_command_breath_frames *wanted;
   const supine_basis *basis;
   size_t lung_count;
-  double *time;     /* [frames] time since the start, s */
-  double *above;    /* [frames] volume minus that at rest (in the scan if rest is unknown), mL */
-  double *gravity;  /* [frames, 3] unit vectors */
-  double *expected; /* [frames] expected error of the displacements, RMS over the vertices, mm */
-  double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
-  double *total;    /* [frames] sum of `volumes` over the lungs, mL */
-  supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
-  float *normals;   /* [N, 3] normals of the current frame, for VTP output */
+  double *time;        /* [frames] time since the start, s */
+  supine_state *state; /* [frames] */
+  double *gravity;     /* [frames, 3] unit vectors */
+  double *expected;    /* [frames] expected error of the displacements, RMS over the vertices, mm */
+  double *volumes;     /* [frames, lungs] volume of gas and tissue, mL */
+  double *total;       /* [frames] sum of `volumes` over the lungs, mL */
+  supine_mesh mesh;    /* triangles; for VTP output, also the positions of the current frame */
+  float *normals;      /* [N, 3] normals of the current frame, for VTP output */
   float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
@@ -48,11 +48,11 @@ static void end(playing *p) {
 /* Allocate memory for the frames. If `one` is true, keep the positions of one frame only, as each
  * is written before the next is computed. */
 static supine_status begin_frames(playing *p, bool one, supine_error *error) {
-  const size_t count = p->wanted->count;
+  const size_t count = p->wanted->breath.count;
   const size_t frame = 3 * supine_basis_get_info(p->basis)->vertex_count;
   p->lung_count = supine_basis_get_info(p->basis)->lung_count;
   p->time = supine_arena_take(&p->arena, count, sizeof *p->time);
-  p->above = supine_arena_take(&p->arena, count, sizeof *p->above);
+  p->state = supine_arena_take(&p->arena, count, sizeof *p->state);
   p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
   p->total = supine_arena_take(&p->arena, count, sizeof *p->total);
@@ -69,26 +69,14 @@ static supine_status begin_frames(playing *p, bool one, supine_error *error) {
              : supine_posed_mesh(p->basis, NULL, &p->mesh, error);
 }
 
-static supine_status find_pose(const playing *p, size_t t, supine_pose *pose, supine_error *error) {
-  const supine_state state = supine_options_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
-  return supine_basis_pose(p->basis, &state, pose, error);
-}
-
 /* Compute the time, the direction of gravity and the volumes of each frame. */
-static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error *error) {
-  for (size_t t = 0; t < p->wanted->count; ++t) {
-    p->time[t] = (double)t / p->wanted->fps;
-    supine_options_turn_gravity(&p->wanted->turn, p->time[t], p->gravity + 3 * t);
-  }
-  SUPINE_TRY(supine_breath_evaluate(pv, &p->wanted->breath, p->wanted->count, p->time, p->above,
-                                    NULL, error));
-  for (size_t t = 0; t < p->wanted->count; ++t) {
+static supine_status find_volumes(playing *p, supine_error *error) {
+  SUPINE_TRY(
+      supine_options_breath_list(p->basis, name, &p->wanted->breath, p->time, p->state, error));
+  for (size_t t = 0; t < p->wanted->breath.count; ++t) {
     supine_pose pose;
-    supine_error cause;
-    const supine_status status = find_pose(p, t, &pose, &cause);
-    if (status != SUPINE_OK) {
-      return supine_error_wrap(error, &cause, "frame at %.3f s: ", p->time[t]);
-    }
+    (void)supine_basis_pose(p->basis, &p->state[t], &pose, NULL);
+    memcpy(p->gravity + 3 * t, p->state[t].gravity, 3 * sizeof *p->gravity);
     (void)supine_basis_volumes(p->basis, &pose, p->volumes + t * p->lung_count);
     p->total[t] = supine_posed_volume(p->basis, &pose);
   }
@@ -98,15 +86,15 @@ static supine_status find_volumes(playing *p, const supine_pv *pv, supine_error 
 static void report(const playing *p) {
   double least;
   double largest;
-  gsl_stats_minmax(&least, &largest, p->total, 1, p->wanted->count);
-  (void)supine_print(stdout,
-                     "%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-                     p->wanted->path, p->wanted->count, p->wanted->count == 1 ? "" : "s",
-                     p->time[p->wanted->count - 1], p->wanted->fps, least, largest);
-  (void)supine_print(stdout,
-                     "compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-                     1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->count),
-                     1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->count), 1e3 * budget);
+  gsl_stats_minmax(&least, &largest, p->total, 1, p->wanted->breath.count);
+  (void)supine_print(
+      stdout, "%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+      p->wanted->path, p->wanted->breath.count, p->wanted->breath.count == 1 ? "" : "s",
+      p->time[p->wanted->breath.count - 1], p->wanted->breath.fps, least, largest);
+  (void)supine_print(
+      stdout, "compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
+      1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->breath.count),
+      1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->breath.count), 1e3 * budget);
 }
 
 /* Compute frame t into p->positions. Call find_volumes first: it checks that each frame has a valid
@@ -114,11 +102,11 @@ static void report(const playing *p) {
 static supine_status play(playing *p, size_t t, supine_error *error) {
   supine_pose pose;
   const double start = supine_clock_seconds();
-  (void)find_pose(p, t, &pose, NULL);
+  (void)supine_basis_pose(p->basis, &p->state[t], &pose, NULL);
   (void)supine_deform(p->basis, &pose, p->positions);
   p->compute_time[t] = supine_clock_seconds() - start;
   const bool goes_on =
-      supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->count);
+      supine_options_progress_step(&p->progress, (double)(t + 1) / (double)p->wanted->breath.count);
   SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   return SUPINE_OK;
 }
@@ -139,11 +127,9 @@ static supine_status next_frame(void *context, size_t t, supine_error *error) {
 static supine_status find_expected(const playing *p, const supine_state *from, bool *known,
                                    supine_error *error) {
   *known = true;
-  for (size_t t = 0; t < p->wanted->count && *known; ++t) {
+  for (size_t t = 0; t < p->wanted->breath.count && *known; ++t) {
     SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-    const supine_state state =
-        supine_options_breath_state(p->basis, p->gravity + 3 * t, p->above[t]);
-    SUPINE_TRY(supine_posed_expected(p->basis, &state, from, &expected, error));
+    SUPINE_TRY(supine_posed_expected(p->basis, &p->state[t], from, &expected, error));
     *known = expected.sigma != NULL;
     p->expected[t] = expected.rms;
   }
@@ -158,7 +144,7 @@ static supine_status write_vtp(playing *p, const supine_state *from, supine_mesh
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lung_count, p->volumes},
                                       {"expected_error_RMS_mm", 1, p->expected}};
-  const supine_mesh_frames frames = {p->wanted->count, p->time, next_frame, p};
+  const supine_mesh_frames frames = {p->wanted->breath.count, p->time, next_frame, p};
   bool known;
   SUPINE_TRY(find_expected(p, from, &known, error));
   save.from = p->origin;
@@ -170,7 +156,7 @@ static supine_status write_vtp(playing *p, const supine_state *from, supine_mesh
 }
 
 static supine_status write_tensors(playing *p, supine_error *error) {
-  const size_t t = p->wanted->count;
+  const size_t t = p->wanted->breath.count;
   const size_t frame = 3 * p->mesh.vertex_count;
   const supine_tensor tensors[] = {
       {"positions", SUPINE_F32, 3, {t, p->mesh.vertex_count, 3}, p->positions + frame},
@@ -191,35 +177,16 @@ static supine_status write_tensors(playing *p, supine_error *error) {
                                   metadata, sizeof metadata / sizeof *metadata, error);
 }
 
-/* Warn of what is wrong with the surfaces of smallest and of largest volume (supine_options_pose).
- */
-static supine_status tell_ends(const playing *p, supine_error *error) {
-  size_t ends[2];
-  gsl_stats_minmax_index(&ends[0], &ends[1], p->total, 1, p->wanted->count);
-  for (size_t i = 0; i < 2; ++i) {
-    supine_pose pose;
-    const supine_state state =
-        supine_options_breath_state(p->basis, p->gravity + 3 * ends[i], p->above[ends[i]]);
-    SUPINE_TRY(supine_options_pose(p->basis, name, &state, &pose, error));
-  }
-  return SUPINE_OK;
-}
-
 supine_status supine_command_breath_write(const supine_command_breath_frames *wanted,
                                           const supine_basis *basis, supine_error *error) {
   SUPINE_FREED_BY(end) playing p = {.wanted = wanted, .basis = basis};
   const bool tensors = supine_text_ends_in(wanted->path, ".safetensors");
   supine_mesh_save_options save = {.comment = p.vtp_comment};
-  supine_pv pv = *supine_breath_normal();
   supine_options_reference_pose from;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &save, error));
   SUPINE_TRY(begin_frames(&p, !tensors, error));
-  if (wanted->pv != NULL) {
-    SUPINE_TRY(supine_options_pv_load(wanted->pv, &pv, error));
-  }
-  SUPINE_TRY(find_volumes(&p, &pv, error));
+  SUPINE_TRY(find_volumes(&p, error));
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &from, error));
-  SUPINE_TRY(tell_ends(&p, error));
   SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
   supine_options_signals_catch(true);
   p.progress = supine_options_progress_begin(name);

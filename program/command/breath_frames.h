@@ -4,18 +4,13 @@
 #define SUPINE_BREATH_FRAMES_H
 
 #include "program/options/breath_turn.h"
-#include "program/options/pv.h"
 #include "program/options/state_options.h"
 
 typedef struct supine_command_breath_frames {
   const char *path; /* file to write, .vtp or .safetensors */
-  breath_turn turn; /* both directions are equal if the body does not turn */
-  supine_pv_breath breath;
-  const char *pv; /* file of the pressure-volume relation; NULL for a normal adult's */
+  supine_options_breath breath;
   bool allow_folds, as_scanned;
   supine_from from;
-  double fps;
-  size_t count;        /* number of frames */
   const char *made_by; /* the command line */
 } supine_command_breath_frames;
 

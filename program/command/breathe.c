@@ -33,33 +33,34 @@ static const supine_option table[] = {
      "turn from one posture to another at constant speed: supine:left:10s takes 10 s. Between "
      "opposite postures, the body turns through left (supine to prone) or through supine (upright "
      "to inverted, left to right). The volume at rest changes with the posture",
-     SUPINE_FILLS(request, frames.turn), .read = supine_options_turn_read,
+     SUPINE_FILLS(request, frames.breath.turn), .read = supine_options_turn_read,
      .wants = "FROM:TO:SECONDS", SUPINE_SAYS_GIVEN(request, turns), .rivals = "gravity"},
     {.help = "The breath:"},
     {"tidal", 0, "VOLUME",
      "tidal volume of both lungs, above rest in the posture, or above the scan if rest is unknown; "
      "default 500mL",
-     SUPINE_FILLS(request, frames.breath.tidal), SUPINE_BREATH},
-    {"rate", 0, "N", "breaths per minute; default 12", SUPINE_FILLS(request, frames.breath.rate),
-     SUPINE_ABOVE_ZERO, SUPINE_MEASURES(RATE)},
+     SUPINE_FILLS(request, frames.breath.cycle.tidal), SUPINE_BREATH},
+    {"rate", 0, "N", "breaths per minute; default 12",
+     SUPINE_FILLS(request, frames.breath.cycle.rate), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(RATE)},
     {"inhale", 0, "SHARE",
      "share of the breath's duration that is spent inhaling, between 0 and 1; default 1/3",
-     SUPINE_FILLS(request, frames.breath.inhale_fraction), .range = {0.0, 1.0}, .open = true,
+     SUPINE_FILLS(request, frames.breath.cycle.inhale_fraction), .range = {0.0, 1.0}, .open = true,
      .wants = "a share between 0 and 1", .more = true},
     {"pv", 0, "FILE", "pressure-volume relation made by 'supine pv fit'; default a normal adult's",
-     SUPINE_FILLS(request, frames.pv), .file = SUPINE_FILE_IN},
+     SUPINE_FILLS(request, frames.breath.pv), .file = SUPINE_FILE_IN},
     {"rest-pressure", 0, "P",
      "pressure at the end of an exhalation; with --pv, of the kind in that file (airway or "
      "transpulmonary), otherwise transpulmonary; default 5",
-     SUPINE_FILLS(request, frames.breath.rest_pressure), SUPINE_MEASURES(PRESSURE), .more = true},
+     SUPINE_FILLS(request, frames.breath.cycle.rest_pressure), SUPINE_MEASURES(PRESSURE),
+     .more = true},
     {"course", 0, "NAME",
      "cosine: pressure follows a cosine; ramp: pressure is linear in time; flow: inflow and "
      "outflow are constant; default cosine",
-     SUPINE_FILLS(request, frames.breath.course), .choices = courses, .more = true},
+     SUPINE_FILLS(request, frames.breath.cycle.course), .choices = courses, .more = true},
     {.table = supine_options_folds, SUPINE_FILLS(request, frames.allow_folds)},
     {.help = "The frames:"},
-    {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, frames.fps), SUPINE_ABOVE_ZERO,
-     .standard = "66.66"},
+    {"fps", 0, "N", "frames per second", SUPINE_FILLS(request, frames.breath.fps),
+     SUPINE_ABOVE_ZERO, .standard = "66.66"},
     {"seconds", 0, "S", "duration; default the duration of the turn, or of one breath",
      SUPINE_FILLS(request, duration), SUPINE_ABOVE_ZERO, SUPINE_MEASURES(TIME)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, frames.from)},
@@ -78,24 +79,21 @@ static supine_status complete(request *wanted, supine_error *error) {
   if (!wanted->turns) {
     supine_state state = {.lung_count = 0};
     SUPINE_TRY(supine_options_state(&wanted->orientation, &state, error));
-    SUPINE_REFUSE_IF(state.volume.kind != SUPINE_VOLUME_DEFAULT || state.lung_count > 0, error,
-                     SUPINE_ERROR_ARGUMENT,
-                     "a breath starts at rest: give --posture without a volume");
-    memcpy(frames->turn.to, state.gravity, sizeof frames->turn.to);
-    memcpy(frames->turn.from, frames->turn.to, sizeof frames->turn.from);
+    SUPINE_TRY(supine_options_breath_lie(&state, &frames->breath, error));
   }
-  double seconds = wanted->turns ? frames->turn.seconds : 60.0 / frames->breath.rate;
+  supine_options_breath *breath = &frames->breath;
+  double seconds = wanted->turns ? breath->turn.seconds : 60.0 / breath->cycle.rate;
   seconds = wanted->duration > 0.0 ? wanted->duration : seconds;
-  const double count = floor(seconds * frames->fps * (1.0 + 1e-12)) + 1.0;
-  frames->count = (size_t)fmin(count, FRAMES_MAX);
+  const double count = supine_options_frame_count(seconds, breath->fps);
+  breath->count = (size_t)fmin(count, FRAMES_MAX);
   SUPINE_REFUSE_IF(!(count <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
                    "%g s at %g frames a second is more than %d frames: lower --seconds or --fps",
-                   seconds, frames->fps, FRAMES_MAX);
+                   seconds, breath->fps, FRAMES_MAX);
   return SUPINE_OK;
 }
 
 static void begin(void *chosen) {
-  ((request *)chosen)->frames.breath = supine_breath_default();
+  ((request *)chosen)->frames.breath.cycle = supine_breath_default();
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine render: draw the lungs in one or several postures, or during a turn. */
+/* supine render: draw the lungs in one or several postures, or during a turn or a breath. */
 #include <string.h>
 
 #include "base/arena.h"
@@ -61,6 +61,10 @@ static const supine_option table[] = {
      "draw a film of one turn at constant speed, such as supine:left:5s", FILLS(turn),
      .read = supine_options_turn_read, .wants = "FROM:TO:SECONDS",
      SUPINE_SAYS_GIVEN(supine_pictures, turns), .rivals = "gravity"},
+    {"breath", 0, "VOLUME",
+     "draw a film of one breath of this tidal volume, such as 500mL, in one posture: the breath of "
+     "'supine breathe'",
+     FILLS(breath), SUPINE_BREATH, .rivals = "breath"},
     {.table = supine_options_volume, FILLS(volume)},
     {"output", 'o', "FILE",
      ".png, .pdf or .svg for postures side by side; .webp for a film, which browsers play",
@@ -94,8 +98,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const bool film = supine_text_ends_in(wanted->output, ".webp");
   SUPINE_REFUSE_IF(!wanted->turns && wanted->postures == NULL, error, SUPINE_ERROR_ARGUMENT,
                    "the posture is missing: give --posture or --turn");
-  SUPINE_REFUSE_IF(wanted->turns && !film, error, SUPINE_ERROR_ARGUMENT,
-                   "--turn draws a film: give -o a name that ends in .webp");
+  SUPINE_REFUSE_IF(wanted->turns && wanted->breath > 0.0, error, SUPINE_ERROR_ARGUMENT,
+                   "give --turn or --breath, not both");
+  SUPINE_REFUSE_IF((wanted->turns || wanted->breath > 0.0) && !film, error, SUPINE_ERROR_ARGUMENT,
+                   "--%s draws a film: give -o a name that ends in .webp",
+                   wanted->turns ? "turn" : "breath");
   SUPINE_REFUSE_IF(
       wanted->largest > 0.0 && wanted->look == SUPINE_LOOK_SHELL, error, SUPINE_ERROR_ARGUMENT,
       "--largest sets the colour bar, which a shell has not: give --look displacement");
@@ -104,10 +111,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
 
 const supine_command supine_command_render = {
     "render",
-    "draw the lungs and their targets: postures side by side, or a film of a turn",
+    "draw the lungs and their targets: postures side by side, or a film of a turn or a breath",
     .usage = "BASIS --posture STATE[,STATE...] -o lungs.png [OPTIONS]\n"
              "BASIS --posture STATE,STATE[,STATE...] -o lungs.webp [OPTIONS]\n"
-             "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]",
+             "BASIS --turn FROM:TO:SECONDS -o turn.webp [OPTIONS]\n"
+             "BASIS --posture NAME --breath VOLUME -o breath.webp [OPTIONS]",
     .about =
         "Draws the lungs in each posture as a translucent shell, on a table and in a faint torso, "
         "with what is inside. The target that moves most, in multiples of its expected error, "
@@ -124,6 +132,7 @@ const supine_command supine_command_render = {
     "  supine render lungs.safetensors --inside nodules.safetensors --posture supine,left \\\n"
     "      -o nodules.png\n"
     "  supine render lungs.safetensors --posture supine,left,prone,left,supine -o film.webp\n"
+    "  supine render lungs.safetensors --posture prone --breath 500mL -o breath.webp\n"
     "  supine render lungs.safetensors --posture prone --from supine:rest --look displacement \\\n"
     "      --view anterior,lateral,posterior -o prone.pdf",
     SUPINE_ONE_BASIS,

@@ -21,13 +21,22 @@ static const double turn_seconds = 1.2; /* duration of a turn between two postur
 
 enum { FPS = 15, FRAMES_MAX = 10000, STOP_MS = 1000 };
 
-/* A film: turns from one posture to the next, with a stop after each. */
+/* A frame of a film. */
+typedef struct frame {
+  supine_state state;
+  char title[SUPINE_POSTURE_NAME_MAX + 24];
+  int ms; /* how long it is shown */
+} frame;
+
 typedef struct film {
-  size_t turn_count;
-  breath_turn turn[SUPINE_POSTURE_LIST_MAX];
-  const char *title[SUPINE_POSTURE_LIST_MAX + 1]; /* of each posture; NULL: print the angle */
-  supine_state state;                             /* its volume is that of all frames */
+  size_t count;
+  frame *frame; /* [count] */
+  supine_arena arena;
 } film;
+
+static void close_film(film *shot) {
+  supine_arena_free(&shot->arena);
+}
 
 /* A state of the lungs that a panel of the picture shows. */
 typedef struct drawn {
@@ -88,11 +97,16 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
   return s->arena.failed ? supine_error_memory(error, "%zu vertices", n) : SUPINE_OK;
 }
 
-/* Fill panel i: compute the pose, the displacements and the subtitle. */
-static supine_status fill_panel(studio *s, size_t i, supine_error *error) {
+/* Fill panel i: compute the pose, the displacements and the subtitle.
+ * @param tell  whether to warn of what is wrong with the lungs (supine_options_pose) */
+static supine_status fill_panel(studio *s, size_t i, bool tell, supine_error *error) {
   const supine_posture_item *item = &s->postures.item[i];
   drawn *shown = &s->shown[i];
-  SUPINE_TRY(supine_options_pose(s->basis, name, &item->state, &shown->pose, error));
+  if (tell) {
+    SUPINE_TRY(supine_options_pose(s->basis, name, &item->state, &shown->pose, error));
+  } else {
+    SUPINE_TRY(supine_basis_pose(s->basis, &item->state, &shown->pose, error));
+  }
   supine_distance_statistics statistics;
   (void)supine_compare_distances(s->compare, &shown->pose, &s->from.pose, shown->value);
   supine_compare_statistics(s->compare, shown->value, &statistics);
@@ -224,7 +238,7 @@ static supine_picture make_picture(studio *s) {
 /* Compute and mark all panels. */
 static supine_status fill_panels(studio *s, supine_error *error) {
   for (size_t i = 0; i < s->postures.count; ++i) {
-    SUPINE_TRY(fill_panel(s, i, error));
+    SUPINE_TRY(fill_panel(s, i, true, error));
     SUPINE_TRY(score_panel(s, i, error));
   }
   for (size_t i = 0; i < s->postures.count; ++i) {
@@ -242,80 +256,30 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Return the number of frames of a turn, with those in its first and its last posture. */
-static double frames_of(const breath_turn *turn) {
-  return fmax(2.0, floor(turn->seconds * FPS * (1.0 + 1e-12)) + 1.0);
-}
-
-/* A frame of a film: frame `at` of the `count` frames of a turn. */
-typedef struct moment {
-  size_t turn;
-  size_t at, count;
-} moment;
-
-/* Advance to the next frame; begin with a zeroed moment. Return false after the last. The first
- * frame of a turn is the last of the turn before, and is not repeated. */
-static bool next_moment(const film *shot, moment *m) {
-  if (m->count == 0) {
-    m->count = (size_t)frames_of(&shot->turn[0]);
-    return true;
-  }
-  if (++m->at == m->count) {
-    ++m->turn;
-    m->at = 1;
-    m->count = m->turn < shot->turn_count ? (size_t)frames_of(&shot->turn[m->turn]) : 0;
-  }
-  return m->turn < shot->turn_count;
-}
-
-static void find_gravity(const film *shot, const moment *m, double gravity[3]) {
-  const breath_turn *turn = &shot->turn[m->turn];
-  supine_options_turn_gravity(turn, (double)m->at / (double)(m->count - 1) * turn->seconds,
-                              gravity);
-}
-
-/* Write what the panel of a film is called: the posture, or the angle of the turn. */
-static void find_title(const film *shot, const moment *m, char *title, size_t size) {
-  const breath_turn *turn = &shot->turn[m->turn];
-  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
-  const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
-  const double share = (double)m->at / (double)(m->count - 1);
-  if (shot->title[0] == NULL) {
-    (void)supine_print_text(title, size, "turned by %.0f of %.0f degrees", share * angle, angle);
-  } else if (m->at == 0 || m->at + 1 == m->count) {
-    (void)supine_print_text(title, size, "%s", shot->title[m->turn + (m->at > 0)]);
-  } else {
-    (void)supine_print_text(title, size, "to %s", shot->title[m->turn + 1]);
-  }
-}
-
 /* Compute a frame of a film, and fill its only panel. */
-static supine_status find_frame(studio *s, const film *shot, const moment *m, supine_error *error) {
-  supine_posture_item *item = &s->postures.item[0];
-  item->state = shot->state;
-  find_gravity(shot, m, item->state.gravity);
-  find_title(shot, m, item->name, sizeof item->name);
-  return fill_panel(s, 0, error);
+static supine_status find_frame(studio *s, const frame *shown, bool tell, supine_error *error) {
+  s->postures.item[0].state = shown->state;
+  SUPINE_TRY(fill_panel(s, 0, tell, error));
+  s->panel[0].title = shown->title;
+  return SUPINE_OK;
 }
 
 /* Append all frames of a film to an animation.
  * @param extent  for each view, the limits of x and y of the lungs over the whole film, mm */
-static supine_status add_frames(studio *s, const film *shot, size_t count,
-                                const double (*extent)[4], supine_animation *animation,
-                                supine_error *error) {
+static supine_status add_frames(studio *s, const film *shot, const double (*extent)[4],
+                                supine_animation *animation, supine_error *error) {
   SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
-  size_t done = 0;
-  for (moment m = {0}; next_moment(shot, &m);) {
-    SUPINE_TRY(find_frame(s, shot, &m, error));
+  for (size_t i = 0; i < shot->count; ++i) {
+    SUPINE_TRY(find_frame(s, &shot->frame[i], false, error));
     SUPINE_TRY(mark_panel(s, 0, error));
     write_legend(s);
     supine_picture picture = make_picture(s);
     picture.extent = extent;
-    SUPINE_TRY(supine_render_animation_add(animation, s->basis, &picture,
-                                           m.at + 1 < m.count ? 1000 / FPS : STOP_MS, error));
-    ++done;
-    const bool goes_on = supine_options_progress_step(&progress, (double)done / (double)count);
+    SUPINE_TRY(
+        supine_render_animation_add(animation, s->basis, &picture, shot->frame[i].ms, error));
+    const bool goes_on =
+        supine_options_progress_step(&progress, (double)(i + 1) / (double)shot->count);
     SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
   return SUPINE_OK;
@@ -327,21 +291,19 @@ static supine_status draw_film(studio *s, const film *shot, supine_error *error)
   static const double none[4] = SUPINE_EXTENT_NONE;
   const char *path = s->wanted->output;
   double extent[SUPINE_VIEWS_MAX][4];
-  size_t count = 0;
   SUPINE_FREED_BY(supine_render_animation_close) supine_animation *animation = NULL;
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   for (size_t view = 0; view < SUPINE_VIEWS_MAX; ++view) {
     memcpy(extent[view], none, sizeof none);
   }
-  for (moment m = {0}; next_moment(shot, &m); ++count) {
-    double gravity[3];
-    find_gravity(shot, &m, gravity);
+  for (size_t i = 0; i < shot->count; ++i) {
+    const double *gravity = shot->frame[i].state.gravity;
     if (s->view[0] == SUPINE_VIEW_LYING && fabs(gravity[2]) > SUPINE_VIEW_LYING_TILT) {
       s->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a patient who gets up stays where it is */
     }
   }
-  for (moment m = {0}; next_moment(shot, &m);) {
-    SUPINE_TRY(find_frame(s, shot, &m, error));
+  for (size_t i = 0; i < shot->count; ++i) {
+    SUPINE_TRY(find_frame(s, &shot->frame[i], shot->frame[i].ms == STOP_MS, error));
     SUPINE_TRY(score_panel(s, 0, error));
     const supine_picture picture = make_picture(s);
     supine_render_picture_extent(s->basis, &picture, extent);
@@ -350,13 +312,14 @@ static supine_status draw_film(studio *s, const film *shot, supine_error *error)
   SUPINE_TRY(supine_output_open(path, &output, error));
   SUPINE_TRY(supine_render_animation_open(picture.width, picture.height, &animation, error));
   supine_options_signals_catch(true);
-  SUPINE_TRY(add_frames(s, shot, count, (const double(*)[4])extent, animation, error));
+  SUPINE_TRY(add_frames(s, shot, (const double(*)[4])extent, animation, error));
   const supine_status status = supine_render_animation_write(animation, output.file, error);
   if (ferror(output.file) == 0) {
     SUPINE_TRY(status);
   }
   SUPINE_TRY(supine_output_commit(&output, error)); /* which says why the file cannot be written */
-  (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height, count);
+  (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height,
+               shot->count);
   return SUPINE_OK;
 }
 
@@ -371,45 +334,107 @@ static bool same_volume(const supine_state *a, const supine_state *b) {
   return same;
 }
 
-/* Make a film that turns from each posture of a list to the next. */
-static supine_status film_of(const supine_posture_list *stops, film *shot, supine_error *error) {
-  SUPINE_REFUSE_IF(stops->count < 2, error, SUPINE_ERROR_ARGUMENT,
-                   "a film needs two postures or more: name where to turn, or give -o a name that "
-                   "ends in .png");
-  shot->state = stops->item[0].state;
-  shot->turn_count = stops->count - 1;
-  for (size_t i = 0; i < stops->count; ++i) {
-    shot->title[i] = supine_options_posture_label(stops->item[i].name);
-    SUPINE_REFUSE_IF(!same_volume(&stops->item[i].state, &shot->state), error,
-                     SUPINE_ERROR_ARGUMENT,
-                     "a film turns at one volume: give it once, with --volume");
-    if (i > 0) {
-      breath_turn *turn = &shot->turn[i - 1];
-      memcpy(turn->from, stops->item[i - 1].state.gravity, sizeof turn->from);
-      memcpy(turn->to, stops->item[i].state.gravity, sizeof turn->to);
-      turn->seconds = turn_seconds;
+/* Append the frames of a turn without the first, with which the turn before ends, and stop at the
+ * last.
+ * @param to  name of the posture at the end; NULL to print the angle */
+static void add_turn(film *shot, const breath_turn *turn, const supine_state *state,
+                     const char *to) {
+  const size_t count = (size_t)fmax(2.0, supine_options_frame_count(turn->seconds, FPS));
+  const double cosine = fmax(-1.0, fmin(1.0, supine_dot(turn->from, turn->to)));
+  const double angle = acos(cosine) * 180.0 / 3.14159265358979323846;
+  for (size_t i = shot->count > 0 ? 1 : 0; i < count; ++i) {
+    frame *next = &shot->frame[shot->count++];
+    const double share = (double)i / (double)(count - 1);
+    const bool last = i + 1 == count;
+    *next = (frame){.state = *state, .ms = last ? STOP_MS : 1000 / FPS};
+    supine_options_turn_gravity(turn, share * turn->seconds, next->state.gravity);
+    if (to == NULL) {
+      (void)supine_print_text(next->title, sizeof next->title, "turned by %.0f of %.0f degrees",
+                              share * angle, angle);
+    } else {
+      (void)snprintf(next->title, sizeof next->title, "%s%s", last ? "" : "to ", to);
     }
+  }
+}
+
+/* Allocate the frames of turns of `seconds` each. */
+static supine_status begin_turns(film *shot, size_t turns, double seconds, supine_error *error) {
+  const double most = fmax(2.0, supine_options_frame_count(seconds, FPS));
+  SUPINE_REFUSE_IF(!(most <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
+                   "a turn of %g s has more than %d frames: give a shorter turn", seconds,
+                   FRAMES_MAX);
+  shot->frame = supine_arena_take(&shot->arena, turns * (size_t)most, sizeof *shot->frame);
+  return supine_arena_check(&shot->arena, error, "the frames of %zu turns", turns);
+}
+
+/* Make a film that turns from each posture of a list to the next. */
+static supine_status turn_through(const supine_posture_list *stops, film *shot,
+                                  supine_error *error) {
+  const supine_posture_item *first = &stops->item[0];
+  SUPINE_REFUSE_IF(stops->count < 2, error, SUPINE_ERROR_ARGUMENT,
+                   "a film needs two postures or more, or a breath: name where to turn, add "
+                   "--breath 500mL, or give -o a name that ends in .png");
+  SUPINE_TRY(begin_turns(shot, stops->count - 1, turn_seconds, error));
+  for (size_t i = 1; i < stops->count; ++i) {
+    const supine_posture_item *item = &stops->item[i];
+    breath_turn turn = {.seconds = turn_seconds};
+    SUPINE_REFUSE_IF(!same_volume(&item->state, &first->state), error, SUPINE_ERROR_ARGUMENT,
+                     "a film turns at one volume: give it once, with --volume");
+    memcpy(turn.from, item[-1].state.gravity, sizeof turn.from);
+    memcpy(turn.to, item->state.gravity, sizeof turn.to);
+    add_turn(shot, &turn, &first->state, supine_options_posture_label(item->name));
+  }
+  (void)snprintf(shot->frame[0].title, sizeof shot->frame[0].title, "%s",
+                 supine_options_posture_label(first->name));
+  return SUPINE_OK;
+}
+
+/* Make a film of one breath in a posture, which ends as it begins. */
+static supine_status breathe_in(const supine_basis *basis, const supine_posture_list *stops,
+                                double tidal, film *shot, supine_error *error) {
+  SUPINE_REFUSE_IF(stops->count != 1, error, SUPINE_ERROR_ARGUMENT,
+                   "a film of a breath has one posture: name one");
+  supine_options_breath breath = {.cycle = supine_breath_default(), .fps = FPS};
+  SUPINE_TRY(supine_options_breath_lie(&stops->item[0].state, &breath, error));
+  breath.cycle.tidal = tidal;
+  breath.count = (size_t)supine_options_frame_count(60.0 / breath.cycle.rate, FPS);
+  shot->frame = supine_arena_take(&shot->arena, breath.count, sizeof *shot->frame);
+  double *time = supine_arena_take(&shot->arena, breath.count, sizeof *time);
+  supine_state *state = supine_arena_take(&shot->arena, breath.count, sizeof *state);
+  SUPINE_TRY(supine_arena_check(&shot->arena, error, "%zu frames", breath.count));
+  SUPINE_TRY(supine_options_breath_list(basis, name, &breath, time, state, error));
+  const char *posture = supine_options_posture_label(stops->item[0].name);
+  for (size_t i = 0; i < breath.count; ++i) {
+    frame *next = &shot->frame[shot->count++];
+    const double above = state[i].volume.ml - state[0].volume.ml;
+    *next = (frame){.state = state[i], .ms = 1000 / FPS};
+    (void)supine_print_text(next->title, sizeof next->title, "%s, %s + %.0f mL", posture,
+                            supine_basis_get_info(basis)->has_rest ? "rest" : "scan", above);
   }
   return SUPINE_OK;
 }
 
-/* Draw a film of --turn, or of the postures of a list. */
+/* Draw a film of --turn, of the postures of a list, or of a breath. */
 static supine_status film_draw(studio *s, const char *path, supine_error *error) {
   const supine_pictures *wanted = s->wanted;
   supine_posture_list stops = {.count = 0};
-  film shot = {.turn_count = 1, .turn = {wanted->turn}, .state = wanted->volume.state};
+  SUPINE_FREED_BY(close_film) film shot = {.count = 0};
   if (wanted->postures != NULL) {
     SUPINE_TRY(
         supine_options_posture_list_parse(wanted->postures, &wanted->volume.state, &stops, error));
     SUPINE_TRY(supine_options_posture_list_check(
         &stops, wanted->volume.state.volume.kind != SUPINE_VOLUME_DEFAULT, error));
-    SUPINE_TRY(film_of(&stops, &shot, error));
   }
-  const double frames = frames_of(&shot.turn[0]);
-  SUPINE_REFUSE_IF(!(frames <= FRAMES_MAX), error, SUPINE_ERROR_ARGUMENT,
-                   "a turn of %g s has more than %d frames: give a shorter turn",
-                   shot.turn[0].seconds, FRAMES_MAX);
+  if (wanted->turns) {
+    SUPINE_TRY(begin_turns(&shot, 1, wanted->turn.seconds, error));
+    add_turn(&shot, &wanted->turn, &wanted->volume.state, NULL);
+  } else if (wanted->breath == 0.0) {
+    SUPINE_TRY(turn_through(&stops, &shot, error));
+  }
   SUPINE_TRY(open_studio(s, path, error));
+  if (wanted->breath > 0.0) {
+    SUPINE_TRY(breathe_in(s->basis, &stops, wanted->breath, &shot, error));
+  }
   return draw_film(s, &shot, error);
 }
 

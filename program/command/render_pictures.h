@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Draw the lungs in several postures as a picture, or during a turn as an animation. */
+/* Draw the lungs in several postures as a picture, or during a turn or a breath as a film. */
 #ifndef SUPINE_RENDER_PICTURES_H
 #define SUPINE_RENDER_PICTURES_H
 
@@ -12,6 +12,7 @@ typedef struct supine_pictures {
   const char *postures; /* list of states, side by side or one after another; NULL for a turn */
   bool turns;
   breath_turn turn;
+  double breath; /* tidal volume of the breath that a film shows, mL; 0 for a turn */
   supine_volume_options volume;
   supine_from from;   /* state from which displacements are measured */
   const char *inside; /* file of structures inside the lungs; NULL if not given */

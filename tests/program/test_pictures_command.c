@@ -734,6 +734,41 @@ TEST(test_render_film_stops_at_each_posture) {
   EXPECT(1, "one volume", "render lungs.safetensors --posture supine,prone:full -o two.webp");
 }
 
+/* A film of a breath ends with the frame it begins with, is most different at the peak, and is refused
+ * as 'breathe' refuses the same breath. */
+TEST(test_render_breath_film_ends_as_it_begins) {
+  enum { FRAMES = 76, PEAK = 25, AREA = 120 * 150 }; /* a breath of 5 s, inhaled in a third of it */
+  static const char *const doors[] = {"breathe lungs.safetensors -o a.vtp --tidal",
+                                      "render lungs.safetensors -o a.webp --breath"};
+  WebPAnimInfo info;
+  int time = 0;
+  for (size_t i = 0; i < sizeof doors / sizeof *doors; ++i) {
+    EXPECT(1, "inhale limb gains above", "%s 9000mL --posture left", doors[i]);
+    EXPECT(1, "is no breath", "%s 0mL --posture left", doors[i]);
+    EXPECT(1, "starts at rest: give --posture without a volume", "%s 500mL --posture left:rest",
+           doors[i]);
+  }
+  EXPECT(1, "one posture", "%s 500mL --posture left,prone", doors[1]);
+  EXPECT(1, "not both", "%s 500mL --turn supine:left:1s", doors[1]);
+  EXPECT(1, "not both", "%s 500mL --posture left --volume rest", doors[1]);
+  EXPECT(1, ".webp", "render lungs.safetensors --posture left --breath 500mL -o a.png");
+  if (!render("lungs.safetensors --posture left --breath 700mL --size 120x150 -o breath.webp")) {
+    skip();
+  }
+  unsigned char *first = read_frame("breath.webp", 0, &info, &time);
+  unsigned char *peak = read_frame("breath.webp", PEAK, &info, &time);
+  unsigned char *late = read_frame("breath.webp", FRAMES - 2, &info, &time);
+  unsigned char *last = read_frame("breath.webp", FRAMES - 1, &info, &time);
+  assert_int_equal(info.frame_count, FRAMES);
+  assert_int_equal(time, FRAMES * 66);
+  assert_memory_equal(first, last, (size_t)4 * AREA);
+  assert_true(frame_difference(first, peak, AREA) > 2 * frame_difference(first, late, AREA));
+  free(first);
+  free(peak);
+  free(late);
+  free(last);
+}
+
 TEST(test_render_options_change_the_picture) {
   static const char *const variants[] = {
       "",
