@@ -82,13 +82,13 @@ static void write_bash(FILE *file) {
   (void)fputs("' -- \"$cur\"))\n    return\n  fi\n  case \"${COMP_WORDS[1]}:$prev\" in\n", file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
     context c = {supine_command_list[i]->name, file};
-    supine_options_visit(supine_command_list[i]->options, 0, bash_value, &c);
+    supine_options_visit(supine_command_list[i], bash_value, &c);
   }
   (void)fputs("  esac\n  case \"${COMP_WORDS[1]}\" in\n", file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
     context c = {supine_command_list[i]->name, file};
     (void)fprintf(file, "  %s) words='", supine_command_list[i]->name);
-    supine_options_visit(supine_command_list[i]->options, 0, bash_name, &c);
+    supine_options_visit(supine_command_list[i], bash_name, &c);
     (void)fputs("--help --help-all' ;;\n", file);
   }
   (void)fputs("  esac\n"

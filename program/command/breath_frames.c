@@ -7,7 +7,6 @@
 
 #include "base/arena.h"
 #include "base/clock.h"
-#include "base/number.h"
 #include "base/text.h"
 #include "mesh/mesh.h"
 
@@ -87,14 +86,19 @@ static void report(const playing *p) {
   double least;
   double largest;
   gsl_stats_minmax(&least, &largest, p->total, 1, p->wanted->breath.count);
-  (void)supine_print(
-      stdout, "%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
-      p->wanted->path, p->wanted->breath.count, p->wanted->breath.count == 1 ? "" : "s",
-      p->time[p->wanted->breath.count - 1], p->wanted->breath.fps, least, largest);
-  (void)supine_print(
-      stdout, "compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
-      1e3 * gsl_stats_median(p->compute_time, 1, p->wanted->breath.count),
-      1e3 * gsl_stats_max(p->compute_time, 1, p->wanted->breath.count), 1e3 * budget);
+  const double median = gsl_stats_median(p->compute_time, 1, p->wanted->breath.count);
+  const double longest = gsl_stats_max(p->compute_time, 1, p->wanted->breath.count);
+  supine_options_line("%s: %zu frame%s, %.2f s at %.4g a second; volumes of %.2f to %.2f mL\n",
+                      p->wanted->path, p->wanted->breath.count,
+                      p->wanted->breath.count == 1 ? "" : "s", p->time[p->wanted->breath.count - 1],
+                      p->wanted->breath.fps, least, largest);
+  supine_options_line("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
+                      1e3 * median, 1e3 * longest, 1e3 * budget);
+  supine_options_add(json_pack(
+      "{s:o, s:I, s:f, s:[f, f], s:f, s:f}", "file", supine_options_json_text(p->wanted->path),
+      "frames", (json_int_t)p->wanted->breath.count, "frames_per_second", p->wanted->breath.fps,
+      "volume_ml", least, largest, "median_compute_ms", 1e3 * median, "longest_compute_ms",
+      1e3 * longest));
 }
 
 /* Compute frame t into p->positions. Call find_volumes first: it checks that each frame has a valid

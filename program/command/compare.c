@@ -34,7 +34,7 @@ typedef struct request {
   const char *postures;
   const char *output;
   const char *inside;
-  bool json, all;
+  bool all;
   supine_frame frame;
   bool has_breath;
 } request;
@@ -53,7 +53,6 @@ static const supine_option table[] = {
      "structures made by 'supine embed' from the same basis: the report has the displacement of "
      "each, with its expected error",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {"json", 0, NULL, "print JSON to standard output instead of text", SUPINE_FILLS(request, json)},
     {"all", 0, NULL, "also print the breath, and the regional expansion by height, as -o has them",
      SUPINE_FILLS(request, all)},
     {"output", 'o', "FILE",
@@ -137,7 +136,7 @@ static supine_status compare_content(supine_comparison *c, const request *wanted
       SUPINE_TRY(add_pair(c->basis, &c->names, item, &wanted->frame, lists, error));
     }
   }
-  supine_options_print(json_incref(lists), wanted->json);
+  supine_options_print(json_incref(lists));
   return SUPINE_OK;
 }
 
@@ -155,7 +154,7 @@ static supine_status report(supine_comparison *c, const request *wanted, supine_
     SUPINE_TRY(supine_options_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
   }
   SUPINE_TRY(supine_report_find(c, error));
-  supine_report_print(c, wanted->json, wanted->all);
+  supine_report_print(c, wanted->all);
   return wanted->output != NULL ? write_file(wanted->output, c, error) : SUPINE_OK;
 }
 

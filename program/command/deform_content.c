@@ -124,8 +124,8 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
   }
   SUPINE_TRY(supine_image_read(wanted->image, &wanted->source, error));
   if (!wanted->density) {
-    supine_options_say(command, "densities are not scaled by the change of volume; for a CT, give "
-                                "--density to keep the tissue's mass");
+    supine_options_note(command, "densities are not scaled by the change of volume; for a CT, give "
+                                 "--density to keep the tissue's mass");
     return SUPINE_OK;
   }
   return supine_warp_check_hounsfield(&wanted->source, wanted->image, error);
@@ -205,8 +205,11 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   SUPINE_TRY(supine_output_commit(&output, error));
   char state[160];
   (void)supine_state_describe(&moved->state, state, sizeof state);
-  (void)printf("%s: %zu %s%s, %s, displacement from %s\n", path, count,
-               each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
+  supine_options_line("%s: %zu %s%s, %s, displacement from %s\n", path, count,
+                      each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
+  supine_options_add(json_pack("{s:o, s:I, s:s, s:s}", "file", supine_options_json_text(path),
+                               each ? "points" : "structures", (json_int_t)count, "state", state,
+                               "displacement_from", moved->from.name));
   return SUPINE_OK;
 }
 
@@ -222,9 +225,13 @@ static supine_status write_field(const supine_deform_content *wanted, const char
                      : "displacement u(x), mm, LPS: the tissue at x, in %s, goes to x + u(x)",
                  from);
   SUPINE_TRY(supine_image_write(wanted->field, nodes, note, error));
-  (void)printf("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
-               wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
-               nodes->size[2]);
+  supine_options_line("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
+                      wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
+                      nodes->size[2]);
+  supine_options_add(json_pack("{s:{s:o, s:[I, I, I], s:b}}", "field", "file",
+                               supine_options_json_text(wanted->field), "nodes",
+                               (json_int_t)nodes->size[0], (json_int_t)nodes->size[1],
+                               (json_int_t)nodes->size[2], "inverse", (int)wanted->inverse));
   return SUPINE_OK;
 }
 
@@ -240,18 +247,27 @@ static supine_status write_image(const char *path, const supine_image *source, b
                      : NULL,
       error));
   const size_t *size = source->size;
-  (void)printf("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
-               tissue != NULL ? ", densities scaled inside the lungs" : "");
+  supine_options_line("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
+                      tissue != NULL ? ", densities scaled inside the lungs" : "");
+  supine_options_add(json_pack("{s:{s:o, s:[I, I, I], s:b}}", labels ? "labels" : "image", "file",
+                               supine_options_json_text(path), "voxels", (json_int_t)size[0],
+                               (json_int_t)size[1], (json_int_t)size[2], "densities_scaled",
+                               (int)(tissue != NULL)));
   return SUPINE_OK;
 }
 
-/* Print an amount for each lung, mL. */
-static void print_lungs(const supine_basis *basis, const double *amount, const char *format) {
+/* Print an amount for each lung, mL; `key` is its name in JSON. */
+static void print_lungs(const supine_basis *basis, const double *amount, const char *format,
+                        const char *key) {
   const supine_basis_info *info = supine_basis_get_info(basis);
+  json_t *lungs = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    (void)supine_print(stdout, "%s%s ", lung == 0 ? "" : ", ", info->lung_names[lung]);
-    (void)supine_print(stdout, format, amount[lung]);
+    supine_options_line("%s%s ", lung == 0 ? "" : ", ", info->lung_names[lung]);
+    supine_options_line(format, amount[lung]);
+    (void)json_object_set_new(lungs, info->lung_names[lung],
+                              supine_options_json_number(amount[lung]));
   }
+  supine_options_add(json_pack("{s:o}", key, lungs));
 }
 
 /* Find the soft tissue of the image, and the parts that --rigid names, unless that is done. */
@@ -263,26 +279,30 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
   }
   if (wanted->density) {
     SUPINE_TRY(supine_warp_tissue_find(forward, &wanted->source, soft, error));
-    (void)printf("%s: soft tissue in the lungs: ", wanted->image);
-    print_lungs(basis, soft->soft, "%.1f mL");
-    (void)putchar('\n');
+    supine_options_line("%s: soft tissue in the lungs: ", wanted->image);
+    print_lungs(basis, soft->soft, "%.1f mL", "soft_tissue_ml");
+    supine_options_line("\n");
     supine_findings findings = {.count = 0};
     supine_warp_check_soft(soft, wanted->image, &findings);
     supine_options_say_findings("deform", &findings);
   } else if (wanted->labels != NULL) {
     SUPINE_TRY(supine_warp_tissue_find_labels(forward, &wanted->label_source, soft, error));
     if (soft->part_count > 0) {
-      (void)printf("%s: without a CT, the shape of labels tells which parts are rigid\n",
-                   wanted->labels);
+      supine_options_line("%s: without a CT, the shape of labels tells which parts are rigid\n",
+                          wanted->labels);
     }
   }
   SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
                                            wanted->rigid.count, soft, error));
+  json_t *parts = json_array();
   for (size_t i = 0; i < soft->part_count; ++i) {
     const double *at = soft->parts[i].centre;
-    (void)supine_print(stdout, "rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
-                       soft->parts[i].volume, at[0], at[1], at[2]);
+    (void)json_array_append_new(parts, json_pack("{s:f, s:o}", "volume_ml", soft->parts[i].volume,
+                                                 "centre", supine_options_json_numbers(3, at)));
+    supine_options_line("rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
+                        soft->parts[i].volume, at[0], at[1], at[2]);
   }
+  supine_options_add(json_pack("{s:o}", "rigid_parts", parts));
   wanted->tissue->found = true;
   return SUPINE_OK;
 }
@@ -295,10 +315,10 @@ static supine_status hold_parts(const supine_tissue *soft, const supine_basis *b
   if (soft->part_count == 0) {
     return SUPINE_OK;
   }
-  (void)printf("field corrected by up to %s mm in rigid parts; it changes the volume: ",
-               supine_text_distance(held.largest).text);
-  print_lungs(basis, held.change, "%+.1f mL");
-  (void)putchar('\n');
+  supine_options_line("field corrected by up to %s mm in rigid parts; it changes the volume: ",
+                      supine_text_distance(held.largest).text);
+  print_lungs(basis, held.change, "%+.1f mL", "volume_change_by_rigid_parts_ml");
+  supine_options_line("\n");
   if (held.folded > 0) {
     supine_options_say("deform",
                        "warning: around rigid parts, the field folds at %zu of its nodes, and "
@@ -312,9 +332,11 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
                             supine_error *error) {
   supine_warp_residual residual = {0};
   SUPINE_TRY(supine_warp_invert(forward, inverse, &residual, error));
-  (void)printf("field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs\n",
-               supine_text_distance(residual.rms).text,
-               supine_text_distance(residual.largest).text);
+  supine_options_line(
+      "field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs\n",
+      supine_text_distance(residual.rms).text, supine_text_distance(residual.largest).text);
+  supine_options_add(json_pack("{s:{s:f, s:f}}", "inverse_residual_mm", "rms", residual.rms,
+                               "largest", residual.largest));
   if (residual.lost > 0) {
     supine_options_say("deform",
                        "warning: the field folds and has no inverse at %zu of its nodes inside the "
@@ -408,6 +430,7 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
   double low = 0.0;
   double high = 0.0;
   bool assumed = false;
+  json_t *lungs = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
     low += isfinite(held.low) ? held.low : held.value;
@@ -415,14 +438,17 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
     assumed = assumed || isfinite(held.low);
   }
   if (assumed) {
-    (void)supine_print(stdout, "; assumed from other people: %.0f to %.0f mL", low, high);
+    supine_options_line("; assumed from other people: %.0f to %.0f mL", low, high);
   }
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
     if (held.source == SUPINE_SOURCE_COLLAPSED) {
-      (void)supine_print(stdout, "; the %s lung is collapsed: %.0f mL", held.name, held.value);
+      supine_options_line("; the %s lung is collapsed: %.0f mL", held.name, held.value);
     }
+    (void)json_object_set_new(lungs, info->lung_names[lung],
+                              supine_options_volume_json(&held, false));
   }
+  supine_options_add(json_pack("{s:o}", "lungs_ml", lungs));
 }
 
 /* Warn of each embedded part whose surface folds between the positions `from` and `to`. */
@@ -515,18 +541,79 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   for (size_t i = 0; i < mesh.vertex_count; ++i) {
     largest = fmax(largest, supine_distance(mesh.vertices + 3 * i, from.vertices + 3 * i));
   }
-  (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
-                     gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
-                     moved->from.name);
+  supine_options_line("%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
+                      gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
+                      moved->from.name);
+  supine_options_add(json_pack("{s:o, s:o, s:s, s:f}", "file", supine_options_json_text(path),
+                               "gravity", supine_options_json_numbers(3, gravity),
+                               "displacement_from", moved->from.name, "largest_displacement_mm",
+                               largest));
   const bool content = supine_basis_metadata(basis, "content") != NULL;
   if (!content) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
-    (void)supine_print(stdout, ", %.2f mL (%+.2f mL)", held,
-                       held - 1e-3 * supine_mesh_volume(&from));
+    supine_options_add(json_pack("{s:f, s:f}", "volume_ml", held, "volume_change_ml",
+                                 held - 1e-3 * supine_mesh_volume(&from)));
+    supine_options_line(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
     print_range(basis, moved);
   }
-  (void)putchar('\n');
+  supine_options_line("\n");
   return content && mesh.triangle_count > 0 ? tell_folds(basis, &from, &mesh, error) : SUPINE_OK;
+}
+
+/* Print the expected errors of positions, and of displacements from another state than the scan. */
+static void print_errors(const supine_deformation *moved) {
+  const supine_expected *position = &moved->errors.position;
+  const supine_expected *displacement = &moved->errors.moved;
+  if (position->sigma != NULL) {
+    supine_options_add(
+        json_pack("{s:{s:f, s:f, s:o}, s:{s:f, s:f}}", "expected_error_mm", "rms", position->rms,
+                  "largest", position->largest, "another_day",
+                  position->another == NULL ? json_null() : json_real(position->another_rms),
+                  "moved_error_mm", "rms", displacement->rms, "largest", displacement->largest));
+  }
+  if (position->another == NULL && position->sigma != NULL) { /* another simulator's fields */
+    supine_options_line("error of the fit to the simulator: %s mm (RMS over the points)\n",
+                        supine_text_distance(position->rms).text);
+  }
+  if (position->another != NULL) {
+    supine_options_line("expected error of the positions: same session %.1f mm (RMS over the "
+                        "points), %.1f mm at most; another day %.1f mm%s\n",
+                        position->rms, position->largest, position->another_rms,
+                        position->turned ? "; an extrapolation, as the posture changes" : "");
+    if (moved->from_given) {
+      supine_options_line("expected error of the displacements: %.1f mm (RMS), %.1f mm at most%s\n",
+                          displacement->rms, displacement->largest,
+                          displacement->turned ? "; an extrapolation, as the posture changes" : "");
+    }
+  }
+}
+
+/* Print in which frame the outputs are, and how the hilum moves. */
+static void print_frame(const supine_deformation *moved) {
+  if (moved->registered) {
+    supine_options_line(
+        "registered at the points of --frame: positions, displacements and errors are what is "
+        "left after it\n");
+    return;
+  }
+  const supine_hilum *hilum = &moved->hilum;
+  supine_options_add(json_pack("{s:{s:o, s:o, s:b}}", "hilum", "moved_mm",
+                               supine_options_json_numbers(3, hilum->move), "expected_error_mm",
+                               supine_options_json_number(hilum->expected), "subtracted",
+                               (int)moved->subtract_hilum));
+  if (supine_length(hilum->move) > 0.0 && supine_length(hilum->move) < 0.1) {
+    supine_options_line("the hilum moves by less than 0.1 mm\n");
+  } else if (supine_length(hilum->move) > 0.0) {
+    supine_options_line("the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
+                        hilum->move[0], hilum->move[1], hilum->move[2]);
+    if (!isnan(hilum->expected)) {
+      supine_options_line(", expected error in the body %.1f mm", hilum->expected);
+    }
+    supine_options_line("%s\n", moved->subtract_hilum
+                                    ? "; subtracted from all positions, whose expected "
+                                      "errors are those relative to the hilum"
+                                    : "");
+  }
 }
 
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
@@ -546,43 +633,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
       SUPINE_TRY(write_surface(wanted->path, basis, moved, error));
     }
   }
-  const supine_expected *position = &moved->errors.position;
-  const supine_expected *displacement = &moved->errors.moved;
-  if (position->another == NULL && position->sigma != NULL) { /* another simulator's fields */
-    (void)supine_print(stdout, "error of the fit to the simulator: %s mm (RMS over the points)\n",
-                       supine_text_distance(position->rms).text);
-  }
-  if (position->another != NULL) {
-    (void)supine_print(stdout,
-                       "expected error of the positions: same session %.1f mm (RMS over the "
-                       "points), %.1f mm at most; another day %.1f mm%s\n",
-                       position->rms, position->largest, position->another_rms,
-                       position->turned ? "; an extrapolation, as the posture changes" : "");
-    if (moved->from_given) {
-      (void)supine_print(stdout,
-                         "expected error of the displacements: %.1f mm (RMS), %.1f mm at most%s\n",
-                         displacement->rms, displacement->largest,
-                         displacement->turned ? "; an extrapolation, as the posture changes" : "");
-    }
-  }
-  if (moved->registered) {
-    (void)puts(
-        "registered at the points of --frame: positions, displacements and errors are what is "
-        "left after it");
-    return SUPINE_OK;
-  }
-  if (supine_length(moved->hilum.move) > 0.0 && supine_length(moved->hilum.move) < 0.1) {
-    (void)puts("the hilum moves by less than 0.1 mm");
-  } else if (supine_length(moved->hilum.move) > 0.0) {
-    (void)supine_print(stdout,
-                       "the hilum moves by %.1f, %.1f, %.1f mm (to the left, back and head)",
-                       moved->hilum.move[0], moved->hilum.move[1], moved->hilum.move[2]);
-    if (!isnan(moved->hilum.expected)) {
-      (void)supine_print(stdout, ", expected error in the body %.1f mm", moved->hilum.expected);
-    }
-    (void)printf("%s\n", moved->subtract_hilum ? "; subtracted from all positions, whose expected "
-                                                 "errors are those relative to the hilum"
-                                               : "");
-  }
+  print_errors(moved);
+  print_frame(moved);
   return SUPINE_OK;
 }

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 #include "mesh/image/image.h"
 #include "precompute/inside/embed.h"
 #include "precompute/lobes.h"
@@ -96,31 +95,47 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   } else if (content->triangle_count > 0) {
     what = "vertices and points";
   }
-  (void)printf("%s: %zu %s", wanted->path, report->count, what);
+  supine_options_line("%s: %zu %s", wanted->path, report->count, what);
   for (size_t lung = 0; lung < shells->count; ++lung) {
-    (void)printf("%s%zu %s", lung == 0 ? ": " : ", ", report->in_lung[lung],
-                 info->lung_names[lung]);
+    supine_options_line("%s%zu %s", lung == 0 ? ": " : ", ", report->in_lung[lung],
+                        info->lung_names[lung]);
   }
   if (grid) {
-    (void)printf("; grid of %zu x %zu x %zu", content->grid.size[0], content->grid.size[1],
-                 content->grid.size[2]);
+    supine_options_line("; grid of %zu x %zu x %zu", content->grid.size[0], content->grid.size[1],
+                        content->grid.size[2]);
   }
-  (void)printf("; %zu multiplications per vertex at run time\n", 3 * info->mode_count + 3);
+  supine_options_line("; %zu multiplications per vertex at run time\n", 3 * info->mode_count + 3);
   if (report->rigid > 0) {
-    (void)printf("rigid parts, which move and rotate but keep their shape: %zu\n", report->rigid);
+    supine_options_line("rigid parts, which move and rotate but keep their shape: %zu\n",
+                        report->rigid);
   }
   if (shells->scan.gains[0][0] != 0.0) {
-    (void)puts("positions were given in the scan; the file holds them at full inflation");
+    supine_options_line(
+        "positions were given in the scan; the file holds them at full inflation\n");
   }
   if (report->outside > 0 && !grid) {
     char text[64];
     part_name(content, report->farthest, text, sizeof text);
-    (void)supine_print(stdout,
-                       "outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
-                       report->outside, report->count, report->farthest_mm, text,
-                       wanted->clamp ? "taken from the nearest point of the surface"
-                                     : "extrapolated from inside (--clamp changes this)");
+    supine_options_line("outside the lungs: %zu of %zu, by at most %.1f mm (%s); motion %s\n",
+                        report->outside, report->count, report->farthest_mm, text,
+                        wanted->clamp ? "taken from the nearest point of the surface"
+                                      : "extrapolated from inside (--clamp changes this)");
   }
+}
+
+/* Add what --json prints: what was embedded, and how much of it lies outside the lungs. */
+static void add_summary(const supine_inside_shells *shells, const supine_inside_report *report,
+                        const request *wanted) {
+  const supine_basis_info *info = supine_basis_get_info(shells->basis);
+  json_t *lungs = json_object();
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    (void)json_object_set_new(lungs, info->lung_names[lung],
+                              json_integer((json_int_t)report->in_lung[lung]));
+  }
+  supine_options_add(json_pack(
+      "{s:o, s:I, s:o, s:I, s:I, s:f}", "file", supine_options_json_text(wanted->path), "points",
+      (json_int_t)report->count, "points_in_lung", lungs, "rigid_parts", (json_int_t)report->rigid,
+      "outside", (json_int_t)report->outside, "farthest_outside_mm", report->farthest_mm));
 }
 
 static supine_status embed(const supine_basis *basis, const request *wanted,
@@ -146,6 +161,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   SUPINE_TRY(supine_inside_embed(&shells, &content, &options, wanted->path, &report, error));
   supine_options_say_findings(name, &report.findings);
   print_summary(&shells, &content, &report, wanted);
+  add_summary(&shells, &report, wanted);
   return SUPINE_OK;
 }
 

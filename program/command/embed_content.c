@@ -46,12 +46,13 @@ static supine_status read_labelled(const supine_embed_content *wanted, const cha
     name_part(path, several_maps, count > 1, parts[i].label, text);
     const char *part = list->count > 0 ? list->name[i] : text;
     if (parts[i].surface.triangle_count == 0) {
-      supine_options_say(name, "%s: %s is left out, as it is thinner than half a voxel everywhere",
-                         path, part);
+      supine_options_say(
+          name, "warning: %s: %s is left out, as it is thinner than half a voxel everywhere", path,
+          part);
       continue;
     }
-    supine_options_say(name, "%s: %s, %.3g mL of voxels; its surface encloses %.3g mL", path, part,
-                       parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface));
+    supine_options_note(name, "%s: %s, %.3g mL of voxels; its surface encloses %.3g mL", path, part,
+                        parts[i].mask, 1e-3 * supine_mesh_volume(&parts[i].surface));
     status = supine_inside_content_surface(part, &parts[i].surface, content, error);
   }
   supine_labels_shapes_free(parts, count);

@@ -5,7 +5,6 @@
 #include <export.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 
@@ -69,11 +68,13 @@ static const supine_option table[] = {
 
 /* Print how far a simplified surface is from the whole one. */
 static void print_simplified(const supine_basis *basis, const export_written *written) {
-  (void)supine_print(stdout,
-                     "simplified from %zu to %zu vertices: %.3f mm RMS and %.2f mm at most from "
-                     "the whole surface\n",
-                     supine_basis_get_info(basis)->vertex_count, written->vertices, written->rms,
-                     written->largest);
+  supine_options_line("simplified from %zu to %zu vertices: %.3f mm RMS and %.2f mm at most from "
+                      "the whole surface\n",
+                      supine_basis_get_info(basis)->vertex_count, written->vertices, written->rms,
+                      written->largest);
+  supine_options_add(json_pack("{s:{s:I, s:f, s:f}}", "simplified", "vertices",
+                               (json_int_t)written->vertices, "rms_mm", written->rms, "largest_mm",
+                               written->largest));
 }
 
 static supine_status write_glb(const supine_basis *basis, const request *wanted,
@@ -83,12 +84,14 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
   const size_t bytes = written.bytes;
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   const bool small = bytes < 100000;
-  (void)supine_print(stdout, "%s: %zu lung%s with morph targets%s, %.*f %s%s\n", wanted->path,
-                     lungs, lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
-                     small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB",
-                     wanted->glb.plain ? ""
-                                       : ", compressed; for model-viewer, set its "
-                                         "meshoptDecoderLocation or use --plain");
+  supine_options_line("%s: %zu lung%s with morph targets%s, %.*f %s%s\n", wanted->path, lungs,
+                      lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
+                      small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB",
+                      wanted->glb.plain ? ""
+                                        : ", compressed; for model-viewer, set its "
+                                          "meshoptDecoderLocation or use --plain");
+  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                               "lungs", (json_int_t)lungs, "bytes", (json_int_t)bytes));
   if (wanted->simplify > 0) {
     print_simplified(basis, &written);
   }
@@ -128,8 +131,8 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
   return SUPINE_OK;
 }
 
-static supine_status write_page(supine_basis *basis, const request *wanted,
-                                const char *basis_path, supine_error *error) {
+static supine_status write_page(supine_basis *basis, const request *wanted, const char *basis_path,
+                                supine_error *error) {
   supine_options_reference_pose from[3];
   char title[256];
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
@@ -160,11 +163,15 @@ static supine_status write_page(supine_basis *basis, const request *wanted,
   SUPINE_TRY(supine_output_open(wanted->path, &output, error));
   SUPINE_TRY(supine_export_html_print(output.file, basis, &page, &written, error));
   SUPINE_TRY(supine_output_commit(&output, error));
-  (void)printf("%s: HTML page of %zu vertices", wanted->path, written.vertices);
+  supine_options_line("%s: HTML page of %zu vertices", wanted->path, written.vertices);
   if (inside != NULL) {
-    (void)printf(" and %zu structure%s inside the lungs", names.count, names.count == 1 ? "" : "s");
+    supine_options_line(" and %zu structure%s inside the lungs", names.count,
+                        names.count == 1 ? "" : "s");
   }
-  (void)puts("; open it in any browser");
+  supine_options_line("; open it in any browser\n");
+  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                               "vertices", (json_int_t)written.vertices, "structures",
+                               (json_int_t)names.count));
   if (wanted->simplify > 0) {
     print_simplified(basis, &written);
   }

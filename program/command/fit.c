@@ -19,7 +19,7 @@ static const char name[] = "fit";
 typedef struct request {
   const char *path, *name, *map;
   supine_landmark_options landmarks;
-  bool has_law, expandability, json;
+  bool has_law, expandability;
   int law;
   supine_source_options source;
 
@@ -104,17 +104,16 @@ static const supine_option table[] = {
      "far the surfaces determine it, 0 (not at all) to 1. 'supine precompute --expandability' "
      "reads the .csv; a .vtp or .ply has both as colours of the surface",
      FILLS(map), .file = SUPINE_FILE_OUT, .endings = ".csv, .vtp or .ply", .more = true},
-    {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
 /* Print the fitted model as JSON, or as text without kriging centres and local expandability. */
-static void print(const supine_patient_record *record, const char *made_by, bool json) {
+static void print(const supine_patient_record *record, const char *made_by) {
   json_t *root = supine_patient_encode(record, made_by);
-  if (!json) {
+  if (!supine_options_as_json()) {
     (void)json_object_del(root, "correction");
     (void)json_object_del(json_object_get(root, "expandability"), "regions");
   }
-  supine_options_print(root, json);
+  supine_options_print(root);
 }
 
 static bool scans_moved(const request *wanted) {
@@ -156,8 +155,8 @@ static supine_status fit_further(const request *wanted, size_t which, supine_pat
   }
   SUPINE_FREED_BY(supine_lungs_free) supine_lungs lungs = {0};
   SUPINE_TRY(supine_options_load_lungs(name, path, &wanted->source, &lungs, error));
-  return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs,
-                                                  record, error);
+  return supine_patient_scans_fit_further_surface(scans, state, scans_moved(wanted), &lungs, record,
+                                                  error);
 }
 
 /* Take the file names from the command line, and check that they fit the options. */
@@ -213,7 +212,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     SUPINE_TRY(
         supine_patient_stiffness_write(wanted->map, &record.stiffness, &scans.lungs[0], error));
   }
-  print(&record, given->made_by, wanted->json);
+  print(&record, given->made_by);
   /* Write the file last, so that a failure leaves no file. */
   return wanted->path != NULL ? supine_patient_write(wanted->path, &record, given->made_by, error)
                               : SUPINE_OK;

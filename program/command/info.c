@@ -175,7 +175,7 @@ static cost cost_of(const supine_basis_info *info) {
 }
 
 static supine_status describe(const char *path, const supine_basis *basis, const double *energy,
-                              bool json, json_t **described, supine_error *error) {
+                              json_t **described, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const cost per_vertex = cost_of(info);
   const char *lungs = supine_basis_metadata(basis, "lungs");
@@ -194,7 +194,7 @@ static supine_status describe(const char *path, const supine_basis *basis, const
   for (size_t i = 0; i < sizeof facts / sizeof *facts; ++i) {
     add_fact(root, facts[i], basis, facts[i]);
   }
-  (void)json_object_set_new(root, "facts", supine_options_facts(basis, !json));
+  (void)json_object_set_new(root, "facts", supine_options_facts(basis, !supine_options_as_json()));
   if (supine_basis_metadata(basis, "content") != NULL) {
     add_content(root, basis);
   }
@@ -220,11 +220,10 @@ static supine_status describe(const char *path, const supine_basis *basis, const
 }
 
 typedef struct request {
-  bool json, all;
+  bool all;
 } request;
 
 static const supine_option table[] = {
-    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {"all", 0, NULL, "also print the terms of the expected error, and how the basis is made",
      SUPINE_FILLS(request, all)},
     {.name = NULL}};
@@ -262,11 +261,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu bands", bands));
   SUPINE_TRY(band_energy(basis, energy, error));
-  SUPINE_TRY(describe(path, basis, energy, wanted->json, &described, error));
-  if (!wanted->json) {
+  SUPINE_TRY(describe(path, basis, energy, &described, error));
+  if (!supine_options_as_json()) {
     described = order_text(described, wanted->all);
   }
-  supine_options_print(json_incref(described), wanted->json);
+  supine_options_print(json_incref(described));
   return SUPINE_OK;
 }
 

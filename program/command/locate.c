@@ -22,7 +22,7 @@ typedef struct request {
   supine_orientation orientation;
   supine_state state; /* the volume is fitted if its kind is SUPINE_VOLUME_DEFAULT */
   double noise, depth;
-  bool rigid, json;
+  bool rigid;
   supine_mesh_load_options load;
 } request;
 
@@ -50,7 +50,6 @@ static const supine_option table[] = {
      "known "
      "in space",
      SUPINE_FILLS(request, depth), .standard = "20", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
-    {"json", 0, NULL, "print JSON instead of text", SUPINE_FILLS(request, json)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},
     {.name = NULL}};
@@ -163,24 +162,21 @@ static void print(const request *wanted, const supine_options_names *names,
       .gravity = {best->state.gravity[0], best->state.gravity[1], best->state.gravity[2]}};
   char text[160];
   (void)supine_state_describe(&posture, text, sizeof text);
-  supine_options_print(
-      json_pack("{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:o*, "
-                "s:I, s:o*, s:f, s:o}",
-                "file", supine_options_json_text(wanted->output), "points", (json_int_t)n,
-                "expected_rms_mm", located->expected_rms, "expected_largest_mm",
-                located->expected_largest, "posture", text, "probability_percent",
-                given ? NULL : json_real(100.0 * share), "determined",
-                given ? NULL : json_boolean(share >= determined), "volume_ml", volume,
-                "volume_deviation_ml", fitted ? json_real(best->volume_error) : NULL,
-                "deviation_without_points_ml", fitted ? json_real(best->volume_prior_error) : NULL,
-                "translation_mm", t[0], t[1], t[2], "rotation_degrees",
-                wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
-                "depth_deviation_mm", best->depth_error > 0.0 ? json_real(best->depth_error) : NULL,
-                "observed_points", (json_int_t)count_points(observed), "lines_of_sight",
-                observed->lines > 0 ? json_integer((json_int_t)observed->lines) : NULL,
-                "residual_rms_mm", best->residual_rms, "outliers",
-                outliers_of(names, observed, located->residuals)),
-      wanted->json);
+  supine_options_print(json_pack(
+      "{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:o*, "
+      "s:I, s:o*, s:f, s:o}",
+      "file", supine_options_json_text(wanted->output), "points", (json_int_t)n, "expected_rms_mm",
+      located->expected_rms, "expected_largest_mm", located->expected_largest, "posture", text,
+      "probability_percent", given ? NULL : json_real(100.0 * share), "determined",
+      given ? NULL : json_boolean(share >= determined), "volume_ml", volume, "volume_deviation_ml",
+      fitted ? json_real(best->volume_error) : NULL, "deviation_without_points_ml",
+      fitted ? json_real(best->volume_prior_error) : NULL, "translation_mm", t[0], t[1], t[2],
+      "rotation_degrees",
+      wanted->rigid ? json_real(acos(cosine) * (180.0 / 3.14159265358979)) : NULL,
+      "depth_deviation_mm", best->depth_error > 0.0 ? json_real(best->depth_error) : NULL,
+      "observed_points", (json_int_t)count_points(observed), "lines_of_sight",
+      observed->lines > 0 ? json_integer((json_int_t)observed->lines) : NULL, "residual_rms_mm",
+      best->residual_rms, "outliers", outliers_of(names, observed, located->residuals)));
 }
 
 /* Print first and write last, so that a failure leaves no file. */
@@ -260,8 +256,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   supine_options_say_findings(name, &findings);
   say_outliers(&names, &observed, located.residuals);
   if (count_points(&observed) < OUTLIER_POINTS) {
-    supine_options_say(name, "with fewer than %d points, a wrong one cannot be found: check them",
-                       (int)OUTLIER_POINTS);
+    supine_options_note(name, "with fewer than %d points, a wrong one cannot be found: check them",
+                        (int)OUTLIER_POINTS);
   }
   return csv ? finish_points(wanted, inside, &names, &observed, &located, error)
              : finish_surface(wanted, lungs, &names, &observed, &located, error);

@@ -2,7 +2,6 @@
 /* supine phantom: make synthetic lungs. */
 #include "precompute/lungs/phantom.h"
 #include "base/arena.h"
-#include "base/number.h"
 
 #include "program/command/list.h"
 #include "program/options/command.h"
@@ -31,8 +30,13 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   (void)given;
   SUPINE_TRY(supine_lungs_phantom_create(wanted->vertices, wanted->volume, &mesh, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &mesh, &save, error));
-  (void)supine_print(stdout, "%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
-                     mesh.vertex_count, mesh.triangle_count, 1e-3 * supine_mesh_volume(&mesh));
+  const double volume = 1e-3 * supine_mesh_volume(&mesh);
+  supine_options_line("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
+                      mesh.vertex_count, mesh.triangle_count, volume);
+  supine_options_add(json_pack("{s:o, s:I, s:I, s:f}", "file",
+                               supine_options_json_text(wanted->path), "vertices",
+                               (json_int_t)mesh.vertex_count, "triangles",
+                               (json_int_t)mesh.triangle_count, "volume_ml", volume));
   return SUPINE_OK;
 }
 

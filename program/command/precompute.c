@@ -5,8 +5,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/csv.h"
-#include "base/number.h"
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/library.h"
@@ -116,24 +114,43 @@ static const char *plural(size_t count) {
  * scanned lungs. */
 static void print_facts(const char *options, const supine_prepared *prepared,
                         const supine_basis *basis) {
-  (void)printf("%s\nassumed and given (%s change it):\n", prepared->source.summary, options);
+  supine_options_line("%s\nassumed and given (%s change it):\n", prepared->source.summary, options);
   supine_options_facts_print(basis);
 }
 
 static void print_errors(const supine_precompute_report *report, const char *at,
                          const char *state) {
-  (void)supine_print(stdout,
-                     "  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS "
-                     "displacement\n"
-                     "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
-                     100.0 * report->relative.rms, 100.0 * report->relative.p95,
-                     100.0 * report->relative.largest, supine_text_distance(report->mm.rms).text,
-                     supine_text_distance(report->mm.p95).text,
-                     supine_text_distance(report->mm.largest).text, at, state);
+  supine_options_line("  %.3g %% RMS, %.3g %% 95th percentile, %.3g %% largest, of the RMS "
+                      "displacement\n"
+                      "  %s mm RMS, %s mm 95th percentile, %s mm largest%s%s\n",
+                      100.0 * report->relative.rms, 100.0 * report->relative.p95,
+                      100.0 * report->relative.largest, supine_text_distance(report->mm.rms).text,
+                      supine_text_distance(report->mm.p95).text,
+                      supine_text_distance(report->mm.largest).text, at, state);
   if (report->turning_rms > 0.0) {
-    (void)supine_print(stdout,
-                       "  %.3g %% RMS, of the part of the displacement that depends on gravity\n",
-                       100.0 * report->turning_rms);
+    supine_options_line("  %.3g %% RMS, of the part of the displacement that depends on gravity\n",
+                        100.0 * report->turning_rms);
+  }
+}
+
+static json_t *errors_json(const supine_precompute_errors *errors, double factor) {
+  return json_pack("{s:f, s:f, s:f}", "rms", factor * errors->rms, "p95", factor * errors->p95,
+                   "largest", factor * errors->largest);
+}
+
+/* Add what --json prints of the basis: its size, what it assumes, and its errors. */
+static void add_report(const request *wanted, const supine_basis *basis,
+                       const supine_precompute_report *report) {
+  supine_options_add(json_pack(
+      "{s:o, s:I, s:I, s:I, s:I, s:o, s:I, s:o, s:o}", "file",
+      supine_options_json_text(wanted->path), "lungs", (json_int_t)report->lung_count, "vertices",
+      (json_int_t)report->vertex_count, "band", (json_int_t)report->band, "modes",
+      (json_int_t)report->mode_count, "facts", supine_options_facts(basis, false), "directions",
+      (json_int_t)report->direction_count, "error_percent", errors_json(&report->relative, 100.0),
+      "error_mm", errors_json(&report->mm, 1.0)));
+  if (report->volume_count > 0) {
+    supine_options_add(json_pack("{s:I, s:I}", "volumes", (json_int_t)report->volume_count,
+                                 "clusters", (json_int_t)report->cluster_count));
   }
 }
 
@@ -141,14 +158,14 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
                          const supine_basis *basis, const supine_precompute_report *report) {
   char state[64];
   supine_precompute_report_state(report, state, sizeof state);
-  (void)printf("%s: %s, %zu vertices, band %zu, %zu %s%s\n", wanted->path,
-               report->lung_count == 2 ? "two lungs" : "one lung", report->vertex_count,
-               report->band, report->mode_count,
-               wanted->model.precompute.modes.harmonics ? "harmonic" : "mode",
-               plural(report->mode_count));
+  supine_options_line("%s: %s, %zu vertices, band %zu, %zu %s%s\n", wanted->path,
+                      report->lung_count == 2 ? "two lungs" : "one lung", report->vertex_count,
+                      report->band, report->mode_count,
+                      wanted->model.precompute.modes.harmonics ? "harmonic" : "mode",
+                      plural(report->mode_count));
   print_facts("--axes, --units, --scanned, --law and --resting", prepared, basis);
-  (void)printf("error against the full solve, on %zu held-out direction%s:\n",
-               report->direction_count, plural(report->direction_count));
+  supine_options_line("error against the full solve, on %zu held-out direction%s:\n",
+                      report->direction_count, plural(report->direction_count));
   print_errors(report, ", at ", state);
 }
 
@@ -157,58 +174,58 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
 static void print_fit(const request *wanted, const supine_prepared *prepared,
                       const supine_basis *basis, const supine_precompute_report *report) {
   const size_t highest = report->band_count - 1;
-  (void)printf("%s: fields of gravity", wanted->path);
+  supine_options_line("%s: fields of gravity", wanted->path);
   if (report->volume_count > 1) {
-    (void)printf(" and volume");
+    supine_options_line(" and volume");
   }
-  (void)printf(": %zu vertices, %zu directions", report->vertex_count, report->direction_count);
+  supine_options_line(": %zu vertices, %zu directions", report->vertex_count,
+                      report->direction_count);
   if (report->volume_count > 1) {
-    (void)printf(", %zu volumes each", report->volume_count);
+    supine_options_line(", %zu volumes each", report->volume_count);
   }
-  (void)printf(", band %zu", report->band);
+  supine_options_line(", band %zu", report->band);
   if (report->volume_count > 1) {
-    (void)printf(", order %zu of volume", report->order);
+    supine_options_line(", order %zu of volume", report->order);
   }
-  (void)printf(", %zu mode%s", report->mode_count, plural(report->mode_count));
+  supine_options_line(", %zu mode%s", report->mode_count, plural(report->mode_count));
   if (report->cluster_count > 0) {
-    (void)printf(", %zu clusters", report->cluster_count);
+    supine_options_line(", %zu clusters", report->cluster_count);
   }
-  (void)puts("");
+  supine_options_line("\n");
   print_facts("--axes, --units and --scanned", prepared, basis);
   const double *nearest = report->nearest_supine;
-  (void)supine_print(
-      stdout,
+  supine_options_line(
       "displacement: %s mm RMS; with gravity along %.2f,%.2f,%.2f (LPS), nearest to supine, %s mm\n"
       "%s gravity on average\n",
       supine_text_distance(report->displacement).text, nearest[0], nearest[1], nearest[2],
       supine_text_distance(fabs(report->along_gravity)).text,
       report->along_gravity < 0.0 ? "against" : "along");
-  (void)printf("the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n",
-               highest, (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
+  supine_options_line(
+      "the directions determine bands up to %zu (%zu harmonic%s); leave-one-out error:\n", highest,
+      (highest + 1) * (highest + 1), highest > 0 ? "s" : "");
   for (size_t band = 0; band <= highest; ++band) {
-    (void)supine_print(stdout, "  band %-2zu  %8.3g %%%s\n", band, 100.0 * report->band_error[band],
-                       band == report->band ? "  <- chosen" : "");
+    supine_options_line("  band %-2zu  %8.3g %%%s\n", band, 100.0 * report->band_error[band],
+                        band == report->band ? "  <- chosen" : "");
   }
   if (report->band == highest && highest + 1 < SUPINE_PRECOMPUTE_BANDS_MAX) {
-    (void)printf("the error is still falling at the highest band, so detail beyond band %zu is "
-                 "missing: about\n%zu evenly spread directions would determine band %zu\n",
-                 highest, 2 * (highest + 2) * (highest + 2), highest + 1);
+    supine_options_line(
+        "the error is still falling at the highest band, so detail beyond band %zu is "
+        "missing: about\n%zu evenly spread directions would determine band %zu\n",
+        highest, 2 * (highest + 2) * (highest + 2), highest + 1);
   }
-  (void)printf("error of the basis, each direction%s predicted from the others:\n",
-               report->volume_count > 2 ? " and each inner volume" : "");
+  supine_options_line("error of the basis, each direction%s predicted from the others:\n",
+                      report->volume_count > 2 ? " and each inner volume" : "");
   print_errors(report, "", "");
   if (report->six_volumes > 0.0) {
-    (void)supine_print(
-        stdout,
+    supine_options_line(
         "between the volumes: about %.2g %% RMS; six volumes for each direction would "
         "make it about %.2g %%\n",
         100.0 * report->volume_error, 100.0 * report->six_volumes);
   }
   if (report->extrapolated > 0.0) {
-    (void)supine_print(stdout,
-                       "the smallest and the largest volumes, predicted from the others (an "
-                       "extrapolation): %.3g %% RMS\n",
-                       100.0 * report->extrapolated);
+    supine_options_line("the smallest and the largest volumes, predicted from the others (an "
+                        "extrapolation): %.3g %% RMS\n",
+                        100.0 * report->extrapolated);
   }
 }
 
@@ -233,18 +250,19 @@ static supine_status print_plan(size_t directions, size_t volumes, supine_error 
   size_t *order = supine_arena_take(&arena, directions * each, sizeof *order);
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu runs", directions * each));
   shuffle(directions * each, order);
-  (void)puts(volumes > 0 ? "x,y,z,fill,run" : "x,y,z");
+  json_t *plan = json_array();
   for (size_t run = 0; run < directions * each; ++run) {
     double g[3];
-    supine_csv_row row = {.file = stdout};
     supine_spiral((double)(order[run] / each), (double)directions, 0.0, g);
-    supine_csv_add(&row, "%.9g,%.9g,%.9g", g[0], g[1], g[2]);
+    json_t *row = json_pack("{s:f, s:f, s:f}", "x", g[0], "y", g[1], "z", g[2]);
     if (volumes > 0) {
-      supine_csv_add(&row, "%.9g", (double)(order[run] % each) / (double)(volumes - 1));
-      supine_csv_add(&row, "%zu", run);
+      const double fill = (double)(order[run] % each) / (double)(volumes - 1);
+      (void)json_object_update_new(row,
+                                   json_pack("{s:f, s:I}", "fill", fill, "run", (json_int_t)run));
     }
-    supine_csv_end_row(&row);
+    (void)json_array_append_new(plan, row);
   }
+  supine_options_print_rows(plan, 9);
   return SUPINE_OK;
 }
 
@@ -296,7 +314,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   }
   SUPINE_TRY(supine_options_prepare(name, &wanted->model, given, &prepared, error));
   if (prepared.patient != NULL) {
-    (void)printf("%s\n", prepared.fit);
+    supine_options_line("%s\n", prepared.fit);
   }
   SUPINE_FREED_BY(free_bytes) supine_bytes bytes = {.data = NULL};
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
@@ -306,6 +324,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   } else {
     print_report(wanted, &prepared, basis, &report);
   }
+  add_report(wanted, basis, &report);
   return SUPINE_OK;
 }
 

@@ -8,7 +8,6 @@
 
 #include "base/arena.h"
 #include "base/blas.h"
-#include "base/csv.h"
 #include "base/locale.h"
 #include "base/output.h"
 
@@ -23,14 +22,12 @@ static const double confidence = 0.95; /* level of the intervals */
 typedef struct request {
   const char *output;
   double step;
-  bool json;
 } request;
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      "JSON file of the parameters and the report, for --pv of 'supine breathe'",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT},
-    {"json", 'j', NULL, "print the report as JSON", SUPINE_FILLS(request, json)},
     {"step", 's', "CMH2O", "for 'show': step of pressure", SUPINE_FILLS(request, step),
      .standard = "1", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(PRESSURE)},
     {.name = NULL}};
@@ -56,14 +53,14 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const char *name = supine_breath_limb_name((supine_pv_limb)limb);
     if (reports[limb].rms_percent > 1.0) {
-      supine_options_say(command, "note: the %s samples deviate from their curve by %.2g %% RMS",
-                         name, reports[limb].rms_percent);
+      supine_options_note(command, "the %s samples deviate from their curve by %.2g %% RMS", name,
+                          reports[limb].rms_percent);
     }
     if (reports[limb].samples > 0) {
       (void)json_object_set_new(root, name, json_limb(&pv.limb[limb], &reports[limb]));
     }
   }
-  supine_options_print(json_incref(root), chosen->json);
+  supine_options_print(json_incref(root));
   if (chosen->output == NULL) {
     return SUPINE_OK;
   }
@@ -73,22 +70,24 @@ static supine_status run_fit(const char *path, const request *chosen, supine_err
   return supine_output_commit(&output, error);
 }
 
-static supine_status print_row(const supine_pv *pv, double pressure, supine_error *error) {
-  supine_csv_row row = {.file = stdout};
-  supine_csv_add(&row, "%.10g", pressure);
+static supine_status add_row(const supine_pv *pv, double pressure, json_t *rows,
+                             supine_error *error) {
+  json_t *row = json_pack("{s:f}", "pressure_cmH2O", pressure);
+  (void)json_array_append_new(rows, row);
   for (int limb = 0; limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     const supine_pv_curve *curve = &pv->limb[limb];
-    if (pressure < curve->pressure[0] || pressure > curve->pressure[1]) {
-      supine_csv_add_text(&row, "");
-      supine_csv_add_text(&row, "");
-      continue;
+    const char *const name = supine_breath_limb_name((supine_pv_limb)limb);
+    double volume = (double)NAN;
+    double compliance = (double)NAN;
+    if (pressure >= curve->pressure[0] && pressure <= curve->pressure[1]) {
+      SUPINE_TRY(supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error));
     }
-    double volume = 0.0;
-    double compliance = 0.0;
-    SUPINE_TRY(supine_breath_curve_evaluate(curve, 1, &pressure, &volume, &compliance, error));
-    supine_csv_add(&row, "%.7g,%.7g", volume, compliance);
+    char key[40];
+    (void)snprintf(key, sizeof key, "%s_mL", name);
+    (void)json_object_set_new(row, key, supine_options_json_number(volume));
+    (void)snprintf(key, sizeof key, "%s_mL_per_cmH2O", name);
+    (void)json_object_set_new(row, key, supine_options_json_number(compliance));
   }
-  supine_csv_end_row(&row);
   return SUPINE_OK;
 }
 
@@ -103,11 +102,13 @@ static supine_status run_show(const char *path, const request *chosen, supine_er
   const double steps = (high - low) / chosen->step;
   SUPINE_REFUSE_IF(!(steps < ROWS_MAX), error, SUPINE_ERROR_ARGUMENT,
                    "--step gives more than %d rows: give a larger step", ROWS_MAX);
-  (void)puts("pressure_cmH2O,inhale_mL,inhale_mL_per_cmH2O,exhale_mL,exhale_mL_per_cmH2O");
+  json_auto_t *rows = json_array();
   for (size_t j = 0; (double)j < steps * (1.0 - 1e-12); ++j) {
-    SUPINE_TRY(print_row(&pv, low + (double)j * chosen->step, error));
+    SUPINE_TRY(add_row(&pv, low + (double)j * chosen->step, rows, error));
   }
-  return print_row(&pv, high, error);
+  SUPINE_TRY(add_row(&pv, high, rows, error));
+  supine_options_print_rows(json_incref(rows), 7);
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -248,11 +248,18 @@ static supine_status fill_panels(studio *s, supine_error *error) {
   return SUPINE_OK;
 }
 
+static void add_result(const char *path, const supine_picture *picture, size_t frames) {
+  supine_options_add(json_pack("{s:o, s:I, s:I, s:I}", "file", supine_options_json_text(path),
+                               "width", (json_int_t)picture->width, "height",
+                               (json_int_t)picture->height, "frames", (json_int_t)frames));
+}
+
 static supine_status draw_postures(studio *s, supine_error *error) {
   SUPINE_TRY(fill_panels(s, error));
   const supine_picture picture = make_picture(s);
   SUPINE_TRY(supine_render_picture_save(s->basis, &picture, s->wanted->output, error));
-  (void)printf("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
+  supine_options_line("%s: %zu x %zu pixels\n", s->wanted->output, picture.width, picture.height);
+  add_result(s->wanted->output, &picture, 1);
   return SUPINE_OK;
 }
 
@@ -318,8 +325,9 @@ static supine_status draw_film(studio *s, const film *shot, supine_error *error)
     SUPINE_TRY(status);
   }
   SUPINE_TRY(supine_output_commit(&output, error)); /* which says why the file cannot be written */
-  (void)printf("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height,
-               shot->count);
+  supine_options_line("%s: %zu x %zu pixels, %zu frames\n", path, picture.width, picture.height,
+                      shot->count);
+  add_result(path, &picture, shot->count);
   return SUPINE_OK;
 }
 

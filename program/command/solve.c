@@ -2,14 +2,13 @@
 /* supine solve: solve the full physics for one direction of gravity. */
 #include <math.h>
 
-#include "precompute/physics/solve.h"
 #include "base/arena.h"
 #include "base/csv.h"
-#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
 #include "precompute/lungs/disease.h"
+#include "precompute/physics/solve.h"
 
 #include "program/command/list.h"
 #include "program/command/solve_iterate.h"
@@ -76,6 +75,8 @@ static supine_status write_column(const supine_prepared *prepared, const request
     supine_csv_add(&row, "%zu,%.9g,%.9g,%.9g,%.17g", i, p[0], p[1], p[2], column[i]);
     supine_csv_end_row(&row);
   }
+  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                               "vertex", (json_int_t)wanted->vertex, "vertices", (json_int_t)n));
   return supine_output_commit(&output, error);
 }
 
@@ -153,11 +154,21 @@ static supine_status find_gains(const supine_prepared *prepared, const request *
 static void print_gains(const supine_lungs *lungs, double gains[2][3]) {
   for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
     const double *gain = gains[lung];
-    (void)supine_print(stdout, ", %s lung's gain %.6g", supine_lungs_name(lungs, lung), gain[0]);
+    supine_options_line(", %s lung's gain %.6g", supine_lungs_name(lungs, lung), gain[0]);
     if (gain[1] != gain[0] || gain[2] != gain[0]) {
-      (void)supine_print(stdout, ",%.6g,%.6g", gain[1], gain[2]);
+      supine_options_line(",%.6g,%.6g", gain[1], gain[2]);
     }
   }
+}
+
+/* Return the gains of x, y and z of each lung, by its name. */
+static json_t *list_gains(const supine_lungs *lungs, double gains[2][3]) {
+  json_t *list = json_object();
+  for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
+    (void)json_object_set_new(list, supine_lungs_name(lungs, lung),
+                              supine_options_json_numbers(3, gains[lung]));
+  }
+  return list;
 }
 
 /* Scale a solution to the volume that --volume gives, and write the deformed surface. */
@@ -198,11 +209,14 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   }
   SUPINE_TRY(supine_options_plausible(&result, error));
   SUPINE_TRY(supine_mesh_save(wanted->path, &deformed, &save, error));
-  (void)supine_print(stdout, "%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
+  supine_options_line("%s: gravity %.4g,%.4g,%.4g", wanted->path, g[0], g[1], g[2]);
   print_gains(lungs, gains);
-  (void)supine_print(stdout, ", largest displacement %s mm, %+.2f mL\n",
-                     supine_text_distance(largest).text,
-                     volume - full);
+  supine_options_line(", largest displacement %s mm, %+.2f mL\n",
+                      supine_text_distance(largest).text, volume - full);
+  supine_options_add(json_pack(
+      "{s:o, s:o, s:o, s:f, s:f, s:f}", "file", supine_options_json_text(wanted->path), "gravity",
+      supine_options_json_numbers(3, g), "gains", list_gains(lungs, gains),
+      "largest_displacement_mm", largest, "volume_ml", volume, "volume_change_ml", volume - full));
   return SUPINE_OK;
 }
 

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Solve by the Pitcher/Catcher iteration of Santhanam 2008. */
 #include <math.h>
-#include <stdio.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 
 #include "precompute/physics/network.h"
 #include "program/command/solve_iterate.h"
+#include "program/options/command.h"
 
 /* The Pitcher/Catcher iteration of [Santhanam2008] stops when the force that remains on each vertex
  * is at most this fraction of the largest applied force. */
@@ -18,8 +17,8 @@ static const double pitcher_tolerance = 1e-6;
 static void report_remaining(void *context, size_t steps, double remaining) {
   const size_t per_vertex = steps / *(const size_t *)context;
   if ((per_vertex & (per_vertex - 1)) == 0) {
-    (void)supine_print(stdout, "Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n",
-                       steps, remaining);
+    supine_options_line("Pitcher/Catcher: %8zu steps, %.3g of the force not yet balanced\n", steps,
+                        remaining);
   }
 }
 
@@ -48,7 +47,8 @@ supine_status supine_command_iterate(const supine_lungs *lungs, const supine_mod
     difference = fmax(difference, fabs(caught[i] - solution->catch_[i]));
     solution->catch_[i] = caught[i];
   }
-  (void)supine_print(stdout, "Pitcher/Catcher: largest difference from the direct solution %.2g\n",
-                     difference);
+  supine_options_line("Pitcher/Catcher: largest difference from the direct solution %.2g\n",
+                      difference);
+  supine_options_add(json_pack("{s:f}", "pitcher_catcher_difference", difference));
   return SUPINE_OK;
 }

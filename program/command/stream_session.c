@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 #include "program/command/stream_session.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
@@ -24,26 +23,49 @@ static bool stop(void *context) {
   return supine_options_interrupted();
 }
 
+/* Add what --json prints of the messages and the latencies. */
+static void add_counts(const supine_stream_results *results) {
+  const supine_stream_counts *n = &results->counts;
+  supine_options_add(json_pack(
+      "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I}", "positions",
+      (json_int_t)n->positions, "poses", (json_int_t)n->poses, "repaired", (json_int_t)n->repaired,
+      "refused", (json_int_t)n->refused, "invalid", (json_int_t)n->invalid, "frames",
+      (json_int_t)n->frames, "sent", (json_int_t)n->sent, "peers", (json_int_t)n->peers,
+      "malformed", (json_int_t)n->malformed, "not_used", (json_int_t)n->skipped, "disconnected",
+      (json_int_t)(n->lost + n->idle), "peers_refused", (json_int_t)n->turned_away,
+      "volumes_refused", (json_int_t)n->unreachable));
+  for (int surfaces = 0; surfaces < 2; ++surfaces) {
+    const supine_stream_latency *latency = &results->latency[surfaces];
+    supine_options_add(json_pack("{s:{s:I, s:I, s:f}}",
+                                 surfaces != 0 ? "surface_latency" : "weights_latency", "frames",
+                                 (json_int_t)latency->count, "late", (json_int_t)latency->late,
+                                 "worst_ms", 1e3 * latency->worst));
+  }
+}
+
 static void report(const supine_stream_results *results, const supine_stream_session *wanted) {
   const supine_stream_counts *n = &results->counts;
+  add_counts(results);
   if (wanted->points != NULL) {
-    (void)printf("received positions of observed points: %zu\n", n->positions);
+    supine_options_line("received positions of observed points: %zu\n", n->positions);
   }
-  (void)printf("poses: %zu (repaired: %zu; refused: %zu); frames: %zu (sent: %zu); peers: %zu\n",
-               n->poses, n->repaired, n->refused, n->frames, n->sent, n->peers);
+  supine_options_line(
+      "poses: %zu (repaired: %zu; refused: %zu); frames: %zu (sent: %zu); peers: %zu\n", n->poses,
+      n->repaired, n->refused, n->frames, n->sent, n->peers);
   if (n->invalid > 0) {
-    (void)printf("poses that the tracker marked as invalid: %zu\n", n->invalid);
+    supine_options_line("poses that the tracker marked as invalid: %zu\n", n->invalid);
   }
   if (n->malformed + n->skipped + n->lost + n->idle + n->turned_away + n->unreachable > 0) {
-    (void)printf("malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; peers "
-                 "refused: %zu; volumes refused: %zu\n",
-                 n->malformed, n->skipped, n->lost + n->idle, n->turned_away, n->unreachable);
+    supine_options_line(
+        "malformed messages: %zu; messages not used: %zu; peers disconnected: %zu; peers "
+        "refused: %zu; volumes refused: %zu\n",
+        n->malformed, n->skipped, n->lost + n->idle, n->turned_away, n->unreachable);
   }
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = &results->latency[surfaces];
     if (latency->count > 0) {
-      (void)supine_print(
-          stdout, "pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
+      supine_options_line(
+          "pose received to %s sent: %zu of %zu frames within %.0f ms, worst %.3f ms\n",
           surfaces != 0 ? "surface" : "weights", latency->count - latency->late, latency->count,
           1e3 * SUPINE_STREAM_BUDGET, 1e3 * latency->worst);
     }
@@ -157,8 +179,9 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
                              .page_size = page->size};
   SUPINE_TRY(supine_stream_web_create(&site, &page->web, error));
   const bool ipv6 = strchr(address.host, ':') != NULL;
-  (void)printf("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
-               ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
+  supine_options_line("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
+                      ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
+  supine_options_add(json_pack("{s:i}", "page_port", (int)site.port));
   return SUPINE_OK;
 }
 
@@ -221,8 +244,11 @@ supine_status supine_command_stream_run(const supine_stream_session *wanted,
   const supine_stream_results *results = supine_stream_server_results(s.server);
   supine_options_signals_catch(true); /* before the line from which others know that it runs */
   if (results->port != 0) {
-    (void)printf("listening on port %d\n", results->port);
+    supine_options_line("listening on port %d\n", results->port);
+    supine_options_add(json_pack("{s:i}", "port", (int)results->port));
   }
+  supine_options_print_results(
+      true); /* others wait for this; the counts follow in a second object */
   (void)fflush(stdout);
   const supine_status status = supine_stream_server_run(s.server, error);
   report(results, wanted);

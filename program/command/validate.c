@@ -20,7 +20,6 @@ typedef struct request {
   supine_validation_state from, to, state[SUPINE_VALIDATION_STATES_MAX];
   size_t count;
   supine_source_options source;
-  bool json;
 } request;
 
 /* Read a state, such as "prone", "prone:rest+500", "0.6:0:-0.8" or "0.6:0:-0.8:full". */
@@ -79,7 +78,6 @@ static const supine_option table[] = {
      "surface of the first --state, with its displacement from the nearest points of the scanned "
      "surface, in mm",
      FILLS(path), .file = SUPINE_FILE_OUT, .endings = ".png, .ply or .vtp"},
-    {"json", 0, NULL, "print JSON instead of text", FILLS(json)},
     {.name = NULL}};
 
 static void set_default_posture(supine_state *state, const double gravity[3]) {
@@ -190,7 +188,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   s.basis = basis;
   SUPINE_TRY(supine_validation_begin(&s, error));
   SUPINE_TRY(validate(wanted, &s, error));
-  supine_command_print_validation(&s, wanted->json);
+  supine_command_print_validation(&s);
   return SUPINE_OK;
 }
 

@@ -53,7 +53,7 @@ static json_t *encode_state(const supine_validation_state *state,
   return root;
 }
 
-void supine_command_print_validation(const supine_validation *s, bool json) {
+void supine_command_print_validation(const supine_validation *s) {
   json_t *states = json_array();
   for (size_t i = 0; i < s->count; ++i) {
     (void)json_array_append_new(states, encode_state(&s->state[i], &s->outcome[i]));
@@ -66,7 +66,7 @@ void supine_command_print_validation(const supine_validation *s, bool json) {
                                         "scale_per_litre", 1e3 * s->line_slope, "off_percent",
                                         100.0 * s->line_off));
   }
-  supine_options_print(root, json);
+  supine_options_print(root);
 }
 
 supine_status supine_command_draw_errors(const supine_validation *s, const char *path,

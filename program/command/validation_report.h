@@ -5,8 +5,8 @@
 
 #include "precompute/validation/validation.h"
 
-/* Print the results to standard output, as text or JSON. */
-void supine_command_print_validation(const supine_validation *s, bool json);
+/* Print the results to standard output. */
+void supine_command_print_validation(const supine_validation *s);
 
 /* Draw one panel for each state that has a scanned surface. */
 supine_status supine_command_draw_errors(const supine_validation *s, const char *path,

@@ -18,17 +18,49 @@
 #include "program/options/command.h"
 #include "runtime/words.h"
 
-void supine_options_say(const char *command, const char *format, ...) {
+static supine_speech spoken; /* standard output and error belong to the process, and so does this */
+
+#define FILLS(member) SUPINE_FILLS(supine_speech, member)
+
+const supine_option supine_options_of_all[] = {
+    {.help = "Of every command:"},
+    {"json", 'j', NULL, "print results as JSON instead of text", FILLS(json)},
+    {"quiet", 'q', NULL, "print neither progress nor notes, only results, warnings and errors",
+     FILLS(quiet)},
+    {.name = NULL}};
+
+void supine_options_speak(const supine_speech *speech) {
+  spoken = *speech;
+}
+
+bool supine_options_as_json(void) {
+  return spoken.json;
+}
+
+static void say(const char *command, const char *kind, const char *format, va_list arguments) {
   enum { LONGEST = 4096 };
   char text[LONGEST];
   char printable[LONGEST];
-  va_list arguments;
-  va_start(arguments, format);
   (void)supine_print_text_list(text, sizeof text, format, arguments);
-  va_end(arguments);
   supine_number_shorten(text);
   supine_utf8_escape(text, "\n", printable, sizeof printable);
-  (void)fprintf(stderr, "supine %s: %s\n", command, printable);
+  (void)fprintf(stderr, "supine %s: %s%s\n", command, kind, printable);
+}
+
+void supine_options_say(const char *command, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  say(command, "", format, arguments);
+  va_end(arguments);
+}
+
+void supine_options_note(const char *command, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  if (!spoken.quiet) {
+    say(command, "note: ", format, arguments);
+  }
+  va_end(arguments);
 }
 
 supine_explained supine_options_explain(const supine_error *error) {
@@ -133,7 +165,7 @@ bool supine_options_interrupted(void) {
 
 supine_progress supine_options_progress_begin(const char *label) {
   const double start = supine_clock_seconds();
-  return (supine_progress){label, start, start, isatty(STDERR_FILENO) == 1};
+  return (supine_progress){label, start, start, !spoken.quiet && isatty(STDERR_FILENO) == 1};
 }
 
 bool supine_options_progress_step(void *progress, double fraction) {
@@ -141,7 +173,7 @@ bool supine_options_progress_step(void *progress, double fraction) {
   const double time = supine_clock_seconds();
   if (fraction >= 1.0) {
     supine_options_progress_end(state);
-  } else if (state->stderr_is_terminal && time - state->shown_at > 0.1) {
+  } else if (state->is_shown && time - state->shown_at > 0.1) {
     state->shown_at = time;
     const double spent = time - state->start;
     (void)supine_print(stderr, "\r%s: %3.0f %%", state->label, 100.0 * fraction);
@@ -154,7 +186,7 @@ bool supine_options_progress_step(void *progress, double fraction) {
 }
 
 void supine_options_progress_end(supine_progress *progress) {
-  if (progress->stderr_is_terminal) {
+  if (progress->is_shown) {
     (void)fputs("\r\033[K", stderr);
     (void)fflush(stderr);
   }

@@ -22,8 +22,21 @@ enum {
   SUPINE_EXIT_NUMERICAL = 5
 };
 
+/* How a command speaks; the options that all commands have fill it. */
+typedef struct supine_speech {
+  bool json;  /* print results as JSON instead of text */
+  bool quiet; /* print neither progress nor notes */
+} supine_speech;
+
+extern const supine_option supine_options_of_all[];
+
+void supine_options_speak(const supine_speech *speech);
+bool supine_options_as_json(void);
+
 /* Print "supine COMMAND: MESSAGE" to stderr. */
 void supine_options_say(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
+/* Print "supine COMMAND: note: MESSAGE" to stderr, unless --quiet is given. */
+void supine_options_note(const char *command, const char *format, ...) SUPINE_PRINTF(2, 3);
 
 /* An error's message, and what to do. */
 typedef struct supine_explained {
@@ -35,13 +48,30 @@ supine_explained supine_options_explain(const supine_error *error);
 /* Flush standard output; return SUPINE_EXIT_OUTPUT if the disk is full or the pipe is closed. */
 int supine_options_finish(const char *command);
 
-/* Print a JSON object or a list of objects to standard output, and release it. If `json` is false,
+/* Print a JSON object or a list of objects to standard output, and release it. Without --json,
  * print text: one line for each member, and a table for each list of objects. supine_options_finish
  * reports failed writes. */
-void supine_options_print(json_t *value, bool json);
+void supine_options_print(json_t *value);
+
+/* Print a list of objects, which hold the same numbers, to standard output, and release it: as CSV of
+ * `digits` significant digits, or with --json as it is. */
+void supine_options_print_rows(json_t *rows, int digits);
+
+/* Print text to standard output, unless --json is given. */
+void supine_options_line(const char *format, ...) SUPINE_PRINTF(1, 2);
+/* Add members to the object that --json prints at the end of the command, and release `members`.
+ * The same are printed as text by supine_options_line. */
+void supine_options_add(json_t *members);
+/* Begin another object: the command has several results of a kind, and --json prints a list. */
+void supine_options_next_result(void);
+/* Print what was added if --json and `succeeded` are true, and release it. */
+void supine_options_print_results(bool succeeded);
 
 /* Return a text such as a file name as a JSON string; replace bytes that are not UTF-8 by "?". */
 json_t *supine_options_json_text(const char *text);
+
+/* Return a number as JSON; null if it is not finite. */
+json_t *supine_options_json_number(double number);
 
 /* Return numbers as a JSON array; numbers that are not finite become null. */
 json_t *supine_options_json_numbers(size_t count, const double *numbers);
@@ -66,7 +96,7 @@ typedef struct supine_progress {
   const char *label;
   double start;    /* start of the work, s (supine_clock_seconds) */
   double shown_at; /* time at which the line was last written, s (supine_clock_seconds) */
-  bool stderr_is_terminal;
+  bool is_shown;   /* stderr is a terminal, and --quiet is not given */
 } supine_progress;
 
 supine_progress supine_options_progress_begin(const char *label);

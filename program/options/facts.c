@@ -5,6 +5,7 @@
 
 #include "base/locale.h"
 
+#include "program/options/command.h"
 #include "program/options/facts.h"
 
 enum { FACT_SIZE = 320 }; /* bytes that hold supine_fact_print */
@@ -39,7 +40,7 @@ void supine_options_facts_print(const supine_basis *basis) {
   for (size_t i = 0; i < count; ++i) {
     char text[FACT_SIZE];
     (void)supine_fact_print(&facts[i], text, sizeof text);
-    (void)printf("  %s: %s\n", facts[i].name, text);
+    supine_options_line("  %s: %s\n", facts[i].name, text);
   }
 }
 

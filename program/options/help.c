@@ -2,7 +2,7 @@
 /* Print the help of a command from its table of options. */
 #include <string.h>
 
-#include "program/options/option.h"
+#include "program/options/command.h"
 
 enum { WIDTH = 80, TEXT_COLUMN = 23 };
 
@@ -44,16 +44,21 @@ static void print_text(const char *text, size_t column, size_t left, FILE *file)
   }
 }
 
-void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
-                          void *context) {
+static void visit(const supine_option *options, size_t base, supine_option_visit *each,
+                  void *context) {
   for (const supine_option *option = options;
        option->name != NULL || option->help != NULL || option->table != NULL; ++option) {
     if (option->table != NULL) {
-      supine_options_visit(option->table, base + option->offset, each, context);
+      visit(option->table, base + option->offset, each, context);
     } else {
       each(context, option, base);
     }
   }
+}
+
+void supine_options_visit(const supine_command *command, supine_option_visit *each, void *context) {
+  visit(command->options, 0, each, context);
+  visit(supine_options_of_all, command->request_size, each, context);
 }
 
 typedef struct printing {
@@ -105,7 +110,7 @@ void supine_options_print_help(const supine_command *command, bool all, FILE *fi
   (void)fputc('\n', file);
   print_text(command->about, 0, 0, file);
   (void)fputc('\n', file);
-  supine_options_visit(command->options, 0, print_row, &p);
+  supine_options_visit(command, print_row, &p);
   if (p.hidden > 0) {
     (void)fprintf(file, "\nMore: %zu further option%s, shown by 'supine %s --help-all'.\n",
                   p.hidden, p.hidden == 1 ? "" : "s", command->name);

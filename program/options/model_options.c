@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 #include "precompute/names.h"
 #include "precompute/patient/checks.h"
 #include "program/options/model_options.h"
@@ -253,34 +252,49 @@ const supine_option supine_options_model[] = {
 static void print_map(const char *path, const supine_source *source) {
   const supine_labels_report *report = &source->report;
   const supine_lungs *lungs = &source->lungs;
-  (void)supine_print(
-      stdout, "%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n", path,
-      report->size[0], report->size[1], report->size[2], report->spacing[0], report->spacing[1],
-      report->spacing[2], report->axes, report->source, report->taken);
+  supine_options_line("%s: %zu x %zu x %zu voxels of %.3g x %.3g x %.3g mm, %s (%s)\n  labels %s\n",
+                      path, report->size[0], report->size[1], report->size[2], report->spacing[0],
+                      report->spacing[1], report->spacing[2], report->axes, report->source,
+                      report->taken);
   if (report->neck > 0.0) {
-    (void)supine_print(stdout, "  the lungs touch: separated at necks up to %.3g mm wide\n",
-                       report->neck);
+    supine_options_line("  the lungs touch: separated at necks up to %.3g mm wide\n", report->neck);
   }
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
-    (void)supine_print(stdout, "%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
+    supine_options_line("%s lung: %.1f mL", lung->side > 0 ? "left" : "right", lung->mask);
     if (lung->closed > 0.0) {
-      (void)supine_print(stdout, "; closed gaps of %.2g mL", lung->closed);
+      supine_options_line("; closed gaps of %.2g mL", lung->closed);
     }
-    (void)supine_print(stdout, "; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n",
-                       lung->islands, lung->islands == 1 ? "island" : "islands", lung->dropped,
-                       lung->cavities, lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
-    (void)supine_print(stdout, "  surface of %zu vertices: %.1f mL",
-                       lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface);
+    supine_options_line("; dropped %zu %s (%.2g mL), filled %zu %s (%.2g mL)\n", lung->islands,
+                        lung->islands == 1 ? "island" : "islands", lung->dropped, lung->cavities,
+                        lung->cavities == 1 ? "cavity" : "cavities", lung->filled);
+    supine_options_line("  surface of %zu vertices: %.1f mL",
+                        lungs->lung_begin[i + 1] - lungs->lung_begin[i], lung->surface);
     if (fabs(lung->surface - lung->mask) >= 0.05) {
-      (void)supine_print(stdout, " (%+.2g mL)", lung->surface - lung->mask);
+      supine_options_line(" (%+.2g mL)", lung->surface - lung->mask);
     }
-    (void)putchar('\n');
+    supine_options_line("\n");
   }
   if (source->axes_hold) {
-    (void)printf("the shape of the lungs confirms the axes in the header: narrow at the head, "
-                 "deepest at the back, the heart on the left\n");
+    supine_options_line(
+        "the shape of the lungs confirms the axes in the header: narrow at the head, "
+        "deepest at the back, the heart on the left\n");
   }
+}
+
+/* Add what --json prints of the label map: its labels, and each lung. */
+static void add_map(const supine_labels_report *report) {
+  json_t *lungs = json_array();
+  for (size_t i = 0; i < report->lung_count; ++i) {
+    const supine_labels_lung *lung = &report->lung[i];
+    (void)json_array_append_new(lungs, json_pack("{s:s, s:f, s:f, s:f, s:f, s:f}", "name",
+                                                 lung->side > 0 ? "left" : "right", "voxels_ml",
+                                                 lung->mask, "closed_ml", lung->closed,
+                                                 "dropped_ml", lung->dropped, "filled_ml",
+                                                 lung->filled, "surface_ml", lung->surface));
+  }
+  supine_options_add(json_pack("{s:{s:s, s:s, s:o}}", "label_map", "labels", report->taken, "axes",
+                               report->axes, "lungs", lungs));
 }
 
 static int show_progress(void *progress, double fraction) {
@@ -317,6 +331,7 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
   options->context = NULL;
   if (prepared->source.is_map) {
     print_map(given->operand[0], &prepared->source);
+    add_map(&prepared->source.report);
   }
   supine_options_say_findings(command, &prepared->source.findings);
   return status;

@@ -237,9 +237,11 @@ static supine_status check_partners(const reading *r, const supine_option *optio
     const supine_option *other = r->rows[i].option;
     char name[40];
     (void)snprintf(name, sizeof name, " %s ", other->name);
-    SUPINE_REFUSE_IF(r->rows[i].given && other != option && strstr(listed, name) == NULL, error,
-                     SUPINE_ERROR_ARGUMENT, "--%s has no effect with --%s: leave one of them out",
-                     other->name, option->name);
+    const bool of_all = r->rows[i].filled == r->request + r->command->request_size;
+    SUPINE_REFUSE_IF(r->rows[i].given && !of_all && other != option && strstr(listed, name) == NULL,
+                     error, SUPINE_ERROR_ARGUMENT,
+                     "--%s has no effect with --%s: leave one of them out", other->name,
+                     option->name);
   }
   return SUPINE_OK;
 }
@@ -352,7 +354,7 @@ static supine_status read_and_run(reading *r, int argc, char **argv, supine_erro
   if (command->begin != NULL) {
     command->begin(r->request);
   }
-  supine_options_visit(command->options, 0, collect, r);
+  supine_options_visit(command, collect, r);
   for (size_t i = 0; i < r->count; ++i) {
     if (r->rows[i].option->standard != NULL) {
       SUPINE_TRY(read_row(&r->rows[i], r->rows[i].option->standard, error));
@@ -363,6 +365,7 @@ static supine_status read_and_run(reading *r, int argc, char **argv, supine_erro
     supine_options_print_help(command, r->help == HELP_ALL, stdout);
     return SUPINE_OK;
   }
+  supine_options_speak((const supine_speech *)(r->request + command->request_size));
   const supine_arguments given = {argv + optind, (size_t)(argc - optind), made_by};
   SUPINE_TRY(check_given(r, given.count, argv, error));
   SUPINE_TRY(check_outputs(r, &given, error));
@@ -387,10 +390,12 @@ static int exit_code(supine_status status) {
 
 int supine_options_run(const supine_command *command, int argc, char **argv) {
   supine_error error = {.message = ""};
-  reading r = {.command = command, .request = calloc(1, command->request_size)};
+  reading r = {.command = command,
+               .request = calloc(1, command->request_size + sizeof(supine_speech))};
   const supine_status status =
       r.request != NULL ? read_and_run(&r, argc, argv, &error) : SUPINE_ERROR_MEMORY;
   free(r.request);
+  supine_options_print_results(status == SUPINE_OK);
   if (status == SUPINE_OK) {
     return supine_options_finish(command->name);
   }

@@ -127,11 +127,12 @@ supine_status supine_options_check_output(const char *output, const char *input,
                                           supine_error *error);
 
 /* Receive one option or heading of a table. The table fills a struct inside the command's struct of
- * all options; `base` is its offset there, bytes. */
+ * all options, or the struct of the options of all commands behind it; `base` is its offset there,
+ * bytes. */
 typedef void supine_option_visit(void *context, const supine_option *option, size_t base);
-/* Call `each` for the options and headings of a table and of the tables that it includes. */
-void supine_options_visit(const supine_option *options, size_t base, supine_option_visit *each,
-                          void *context);
+/* Call `each` for the options and headings of a command, and of the tables that these include, and
+ * for the options that all commands have. */
+void supine_options_visit(const supine_command *command, supine_option_visit *each, void *context);
 
 /* Print the help of a command. Unless `all` is true, omit options whose field `more` is true. */
 void supine_options_print_help(const supine_command *command, bool all, FILE *file);

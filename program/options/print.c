@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Print a JSON value as JSON, or as text in lines and tables. */
 #include <math.h>
+#include <stdarg.h>
 #include <string.h>
 
 #include <jansson.h>
 
+#include "base/csv.h"
 #include "base/locale.h"
+#include "base/number.h"
 #include "base/text.h"
 #include "base/utf8.h"
 
@@ -353,17 +356,21 @@ json_t *supine_options_json_text(const char *text) {
   return json_string(supine_text_make_utf8(printable));
 }
 
+json_t *supine_options_json_number(double number) {
+  return isfinite(number) ? json_real(number) : json_null();
+}
+
 json_t *supine_options_json_numbers(size_t count, const double *numbers) {
   json_t *list = json_array();
   for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(list, isfinite(numbers[i]) ? json_real(numbers[i]) : json_null());
+    (void)json_array_append_new(list, supine_options_json_number(numbers[i]));
   }
   return list;
 }
 
-void supine_options_print(json_t *value, bool json) {
+void supine_options_print(json_t *value) {
   SUPINE_C_LOCALE;
-  if (json) {
+  if (supine_options_as_json()) {
     (void)json_dumpf(value, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     (void)putchar('\n');
   } else if (json_is_array(value)) {
@@ -372,4 +379,67 @@ void supine_options_print(json_t *value, bool json) {
     print_object("", value, 0);
   }
   json_decref(value);
+}
+
+void supine_options_print_rows(json_t *rows, int digits) {
+  if (supine_options_as_json()) {
+    supine_options_print(rows);
+    return;
+  }
+  size_t i;
+  json_t *row;
+  const char *name;
+  json_t *member;
+  supine_csv_row line = {.file = stdout};
+  json_object_foreach(json_array_get(rows, 0), name, member) {
+    supine_csv_add_text(&line, name);
+  }
+  supine_csv_end_row(&line);
+  json_array_foreach(rows, i, row) {
+    json_object_foreach(row, name, member) {
+      if (json_is_number(member)) {
+        supine_csv_add(&line, "%.*g", digits, json_number_value(member));
+      } else {
+        supine_csv_add_text(&line, "");
+      }
+    }
+    supine_csv_end_row(&line);
+  }
+  json_decref(rows);
+}
+
+static json_t *results; /* list of objects to print at the end of the command, as JSON */
+
+void supine_options_line(const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  if (!supine_options_as_json()) {
+    (void)supine_print_list(stdout, format, arguments);
+  }
+  va_end(arguments);
+}
+
+void supine_options_next_result(void) {
+  if (results == NULL) {
+    results = json_array();
+  }
+  (void)json_array_append_new(results, json_object());
+}
+
+void supine_options_add(json_t *members) {
+  if (results == NULL) {
+    supine_options_next_result();
+  }
+  json_t *last = json_array_get(results, json_array_size(results) - 1);
+  (void)json_object_update(last, members);
+  json_decref(members);
+}
+
+void supine_options_print_results(bool succeeded) {
+  if (succeeded && results != NULL && supine_options_as_json()) {
+    const bool single = json_array_size(results) == 1;
+    supine_options_print(json_incref(single ? json_array_get(results, 0) : results));
+  }
+  json_decref(results);
+  results = NULL;
 }

@@ -29,9 +29,9 @@ static void tell_rest(const char *command, const supine_basis *basis, const supi
   if (absolute && assumed) {
     const double held = supine_posed_volume(basis, pose);
     const double above = held - supine_posed_volume(basis, resting);
-    supine_options_say(
+    supine_options_note(
         command,
-        "note: %.0f mL are rest %c %.0f mL, with a volume at rest assumed from other "
+        "%.0f mL are rest %c %.0f mL, with a volume at rest assumed from other "
         "people: if this is the end of an expiration, make the basis with --resting",
         held, above < 0.0 ? '-' : '+', fabs(above));
   }
@@ -59,11 +59,12 @@ void supine_options_tell_state(const char *command, const supine_basis *basis,
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const double share = held[lung] / info->reference_volume[lung];
     if (share < residual_share && held[lung] < at_rest[lung] - 1.0) {
-      supine_options_say(command,
-                         "note: the %s lung holds %.0f mL, %.0f %% of full inflation, less than a "
-                         "full expiration leaves (about %.0f %%): a collapsing lung moves to its "
-                         "hilum, but this law moves it to the back and the head",
-                         info->lung_names[lung], held[lung], 100.0 * share, 100.0 * residual_share);
+      supine_options_note(command,
+                          "the %s lung holds %.0f mL, %.0f %% of full inflation, less than a "
+                          "full expiration leaves (about %.0f %%): a collapsing lung moves to its "
+                          "hilum, but this law moves it to the back and the head",
+                          info->lung_names[lung], held[lung], 100.0 * share,
+                          100.0 * residual_share);
     }
   }
 }

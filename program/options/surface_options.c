@@ -62,7 +62,11 @@ void supine_options_say_findings(const char *command, const supine_findings *fin
     char text[1024];
     (void)snprintf(text, sizeof text, "%s", found->text);
     supine_remedies_add(found->remedies, SUPINE_WORDS_COMMAND, text, sizeof text);
-    supine_options_say(command, "%s: %s", found->is_warning ? "warning" : "note", text);
+    if (found->is_warning) {
+      supine_options_say(command, "warning: %s", text);
+    } else {
+      supine_options_note(command, "%s", text);
+    }
   }
   if (findings->dropped > 0) {
     supine_options_say(command, "warning: and %zu more", findings->dropped);

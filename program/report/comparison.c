@@ -87,7 +87,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
     status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
     if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
-      supine_options_say(command, "note: without a breath: %s", supine_options_explain(error).text);
+      supine_options_note(command, "without a breath: %s", supine_options_explain(error).text);
       return SUPINE_OK;
     }
   }

@@ -76,9 +76,9 @@ static inline double supine_report_expansion(const supine_slab *slab) {
 /* Return the volume of a lung in a posture, mL. */
 supine_fact supine_report_held(const supine_comparison *comparison, size_t posture, size_t lung);
 
-/* Print the comparison to standard output, as JSON or as text with tables of the postures: what was
- * asked for, and with `all` the breath and the regional expansion by height. */
-void supine_report_print(const supine_comparison *comparison, bool json, bool all);
+/* Print the comparison to standard output, with --json or as text with tables of the postures: what
+ * was asked for, and with `all` the breath and the regional expansion by height. */
+void supine_report_print(const supine_comparison *comparison, bool all);
 
 /* Write the comparison as CSV. A write error sets the error indicator of `file`. */
 void supine_report_table(const supine_comparison *comparison, FILE *file);

@@ -160,7 +160,7 @@ static json_t *order_text(json_t *root, bool all) {
   return text;
 }
 
-void supine_report_print(const supine_comparison *c, bool json, bool all) {
+void supine_report_print(const supine_comparison *c, bool all) {
   char volume[160];
   supine_report_volume(c, volume, sizeof volume);
   json_t *root = json_pack("{s:i, s:o, s:s, s:s, s:I, s:f}", "schema", SUPINE_COMPARISON_SCHEMA,
@@ -168,16 +168,14 @@ void supine_report_print(const supine_comparison *c, bool json, bool all) {
                            "displacement_from", c->reference.name, "vertices",
                            (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area_mm2",
                            supine_compare_area(c->compare));
-  if (!json) {
-    (void)json_object_del(root, "schema");
-  }
-  if (json) {
+  if (supine_options_as_json()) {
     json_t *postures = json_array();
     for (size_t i = 0; i < c->postures.count; ++i) {
       (void)json_array_append_new(postures, encode_posture(c, i));
     }
     (void)json_object_set_new(root, "postures", postures);
   } else {
+    (void)json_object_del(root, "schema");
     add_tables(c, all, root);
     if (c->has_errors) {
       (void)json_object_set_new(root, "expected error",
@@ -185,5 +183,5 @@ void supine_report_print(const supine_comparison *c, bool json, bool all) {
     }
     root = order_text(root, all);
   }
-  supine_options_print(root, json);
+  supine_options_print(root);
 }
