@@ -185,18 +185,26 @@ void supine_doubt_evaluate_one(const supine_doubt *doubt, const supine_doubt_poi
   supine_doubt_evaluate(doubt, point->state, point->vertex, point->vertex + 1, features);
 }
 
-double supine_doubt_isotropic(const supine_doubt *d, const supine_doubt_features *a,
-                              const supine_doubt_features *b) {
+double supine_doubt_kernel(const supine_doubt_features *a, const supine_doubt_features *b) {
   supine_kriging_model unit = supine_kriging_default;
-  double correlation = 0;
   unit.sill = 3; /* so that a size of 1 has the variance 1 on each axis */
   unit.least = 0;
+  return supine_kriging_covariance(&unit, a->place, 1, b->place, 1, a->lung == b->lung);
+}
+
+double supine_doubt_day_square(const supine_doubt *d) {
+  const double day = axis_share * (d->another_day ? SUPINE_ANOTHER_DAY_MM : 0);
+  return day * day;
+}
+
+double supine_doubt_isotropic(const supine_doubt *d, const supine_doubt_features *a,
+                              const supine_doubt_features *b) {
+  double correlation = 0;
   for (size_t k = 0; k < d->state_count; ++k) {
     correlation += d->root[a->state][k] * d->root[b->state][k];
   }
-  const double day = axis_share * (d->another_day ? SUPINE_ANOTHER_DAY_MM : 0);
-  return (a->deviation * b->deviation * correlation + day * day) *
-         supine_kriging_covariance(&unit, a->place, 1, b->place, 1, a->lung == b->lung);
+  return (a->deviation * b->deviation * correlation + supine_doubt_day_square(d)) *
+         supine_doubt_kernel(a, b);
 }
 
 supine_status supine_doubt_covariance(const supine_doubt *doubt, size_t count,

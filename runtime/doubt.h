@@ -37,6 +37,12 @@ void supine_doubt_evaluate(const supine_doubt *doubt, size_t state, size_t begin
 void supine_doubt_evaluate_one(const supine_doubt *doubt, const supine_doubt_point *point,
                                supine_doubt_features *features);
 
+/** Return k_ij of supine/doubt.h, the correlation of the errors of two points. */
+double supine_doubt_kernel(const supine_doubt_features *a, const supine_doubt_features *b);
+
+/** Return the variance of each axis by another day, mm^2; 0 unless it was asked for. */
+double supine_doubt_day_square(const supine_doubt *doubt);
+
 /** Return the covariance of one axis of the isotropic terms of two points, mm^2. */
 double supine_doubt_isotropic(const supine_doubt *doubt, const supine_doubt_features *a,
                               const supine_doubt_features *b);

@@ -93,7 +93,7 @@ static void add_pair(const pair *p, double factor, const double place[3], double
  */
 static void add_part(const supine_doubt *d, const supine_doubt_features *features, size_t count,
                      size_t part, const pair *p, float *xyz) {
-  const double day = 2.0 / 3.0 * SUPINE_ANOTHER_DAY_MM;
+  const double day = sqrt(supine_doubt_day_square(d));
   for (size_t i = 0; i < count; ++i) {
     const supine_doubt_features *f = &features[i];
     const double factor = part == d->state_count ? day : f->deviation * d->root[f->state][part];

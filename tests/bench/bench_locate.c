@@ -21,6 +21,7 @@
 #include <gsl/gsl_randist.h>
 #include <gsl/gsl_rng.h>
 
+#include <supine/doubt.h>
 #include <supine/locate.h>
 
 #include "base/clock.h"
@@ -261,9 +262,49 @@ static void prepare(const char *folder, bool inhaling, person *people, double *p
   }
 }
 
+/* Time samples of the expected error, mended, against the expected errors and the positions. */
+static void clock_samples(const supine_basis *basis, const supine_state *state, float *xyz,
+                          float *sigma) {
+  enum { REPEATS = 5 };
+  static const char *const names[] = {"positions", "expected errors", "preparing samples",
+                                      "a sample", "mending it"};
+  const supine_doubt_task task = {.basis = basis, .state_count = 1, .states = state};
+  double *space = malloc(supine_doubt_space(1) * sizeof *space);
+  double *more = malloc(supine_doubt_mend_space(basis) * sizeof *more);
+  double least[5] = {INFINITY, INFINITY, INFINITY, INFINITY, INFINITY};
+  supine_error error;
+  supine_pose pose;
+  need(supine_basis_pose(basis, state, &pose, &error), &error);
+  for (size_t k = 0; k < REPEATS; ++k) {
+    const supine_doubt *doubt = NULL;
+    const supine_doubt_mend *mend = NULL;
+    double at[6] = {supine_clock_seconds()};
+    supine_deform(basis, &pose, xyz);
+    at[1] = supine_clock_seconds();
+    need(supine_expected_error(basis, state, NULL, sigma, &error), &error);
+    at[2] = supine_clock_seconds();
+    need(supine_doubt_prepare(&task, space, &doubt, &error), &error);
+    need(supine_doubt_mend_prepare(doubt, 0, more, &mend, &error), &error);
+    at[3] = supine_clock_seconds();
+    need(supine_doubt_sample(doubt, 0, 1, k, xyz, &error), &error);
+    at[4] = supine_clock_seconds();
+    need(supine_doubt_mend_sample(mend, xyz, &error), &error);
+    at[5] = supine_clock_seconds();
+    for (size_t i = 0; i < 5; ++i) {
+      least[i] = fmin(least[i], at[i + 1] - at[i]);
+    }
+  }
+  for (size_t i = 0; i < 5; ++i) {
+    (void)printf("%s: %.2f ms, %.1f times the expected errors\n", names[i], 1e3 * least[i],
+                 least[i] / least[1]);
+  }
+  free(space);
+  free(more);
+}
+
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
-  static const double resting[9] = {1700 * -3.5449077018110318};
+  static const double resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
   static float truth[3 * VERTICES];
   static float xyz[3 * VERTICES];
   static float sigma[VERTICES];
@@ -311,6 +352,7 @@ static void clock_library(void) {
         REPEATS);
   }
   free(space);
+  clock_samples(basis, &state, xyz, sigma);
   supine_basis_close(basis);
   free(bytes);
 }

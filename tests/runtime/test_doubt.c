@@ -12,6 +12,7 @@ enum { VERTICES = 40, STATES = 4, PER_STATE = 6, POINTS = STATES * PER_STATE, SI
 static const char *const names[STATES] = {"supine:rest", "prone:rest", "left:rest+300", "2000mL"};
 
 typedef struct world {
+  fixture *fixture;
   unsigned char *bytes;
   supine_basis *basis;
   supine_state states[STATES];
@@ -40,7 +41,7 @@ static int setup(void **state) {
   size_t size = 0;
   f->resting = resting;
   w->bytes = fixture_bytes(f, &size);
-  fixture_destroy(f);
+  w->fixture = f;
   assert_int_equal(supine_basis_open_memory(w->bytes, size, &w->basis, NULL), SUPINE_OK);
   for (size_t s = 0; s < STATES; ++s) {
     w->states[s].gravity[1] = 1;
@@ -61,6 +62,7 @@ static int setup(void **state) {
 static int teardown(void **state) {
   world *w = *state;
   supine_basis_close(w->basis);
+  fixture_destroy(w->fixture);
   free(w->bytes);
   free(w->space);
   free(w);
@@ -273,6 +275,129 @@ TEST(test_sample_thousand_have_the_covariance) {
   assert_memory_not_equal(again, xyz, sizeof again);
 }
 
+/* Compute the volume of a lung, mm^3, and its change with every coordinate, mm^2. */
+static double find_gradient(const world *w, size_t lung, const float *xyz,
+                            double gradient[3 * VERTICES]) {
+  double moved[3 * VERTICES];
+  for (size_t i = 0; i < 3 * VERTICES; ++i) {
+    moved[i] = (double)xyz[i];
+  }
+  const double volume = fixture_volume(w->fixture, lung, moved);
+  for (size_t i = 0; i < 3 * VERTICES; ++i) { /* a volume is linear in each coordinate */
+    moved[i] += 1;
+    gradient[i] = 1e3 * (fixture_volume(w->fixture, lung, moved) - volume);
+    moved[i] -= 1;
+  }
+  return 1e3 * volume;
+}
+
+/* Compute the variances of all coordinates if both volumes are known: the diagonal of C - C g (g' C
+ * g)^-1 g' C. */
+static void condition(const world *w, size_t state, const float *predicted,
+                      double variance[3 * VERTICES]) {
+  enum { N = 3 * VERTICES };
+  static double covariance[N * N];
+  double gradient[2][N];
+  double along[2][N] = {{0}};
+  double product[2][2] = {{0}};
+  supine_doubt_point points[VERTICES];
+  for (size_t i = 0; i < VERTICES; ++i) {
+    points[i] = (supine_doubt_point){i, state};
+  }
+  assert_int_equal(supine_doubt_covariance(w->doubt, VERTICES, points, NULL, covariance, NULL),
+                   SUPINE_OK);
+  for (size_t a = 0; a < 2; ++a) {
+    (void)find_gradient(w, a, predicted, gradient[a]);
+    for (size_t e = 0; e < (size_t)N * N; ++e) {
+      along[a][e / N] += covariance[e] * gradient[a][e % N];
+    }
+  }
+  for (size_t e = 0; e < 4 * (size_t)N; ++e) {
+    product[e % 4 / 2][e % 2] += gradient[e % 4 / 2][e / 4] * along[e % 2][e / 4];
+  }
+  const double whole = product[0][0] * product[1][1] - product[0][1] * product[1][0];
+  for (size_t i = 0; i < N; ++i) {
+    const double a = along[0][i];
+    const double b = along[1][i];
+    variance[i] =
+        covariance[i * (N + 1)] -
+        (a * a * product[1][1] - 2 * a * b * product[0][1] + b * b * product[0][0]) / whole;
+  }
+}
+
+/* Return whether a triangle of the fixture has another side outside than before. */
+static bool is_turned(const world *w, size_t triangle, const float *before, const float *now) {
+  double product = 0;
+  double area[2][3];
+  for (size_t which = 0; which < 2; ++which) {
+    const float *xyz = which == 0 ? before : now;
+    const uint32_t *corner = w->fixture->triangle + 3 * triangle;
+    double side[2][3];
+    for (size_t e = 0; e < 6; ++e) {
+      side[e / 3][e % 3] =
+          (double)xyz[3 * corner[1 + e / 3] + e % 3] - (double)xyz[3 * corner[0] + e % 3];
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      area[which][k] =
+          side[0][(k + 1) % 3] * side[1][(k + 2) % 3] - side[0][(k + 2) % 3] * side[1][(k + 1) % 3];
+    }
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    product += area[0][k] * area[1][k];
+  }
+  return !(product > 0);
+}
+
+/* Mended samples hold the predicted volumes, turn no triangle over, and have the errors that remain
+ * if the volumes are known: each point's within 10 %. */
+TEST(test_mend_thousand_samples_hold_volumes_and_conditional_errors) {
+  enum { SAMPLES = 1000 };
+  world *w = *state;
+  double *space = fixture_allocate(supine_doubt_mend_space(w->basis), sizeof *space);
+  double scratch[3 * VERTICES];
+  float predicted[3 * VERTICES];
+  float xyz[3 * VERTICES];
+  size_t turned[2] = {0, 0};                        /* triangles, before and after mending */
+  for (size_t s = 0; s < STATES; s += STATES - 1) { /* an assumed and a given volume */
+    double square[VERTICES] = {0};
+    double variance[3 * VERTICES];
+    double volume[2];
+    const supine_doubt_mend *mend = NULL;
+    supine_pose pose;
+    assert_int_equal(supine_basis_pose(w->basis, &w->states[s], &pose, NULL), SUPINE_OK);
+    supine_deform(w->basis, &pose, predicted);
+    condition(w, s, predicted, variance);
+    assert_int_equal(supine_doubt_mend_prepare(w->doubt, s, space, &mend, NULL), SUPINE_OK);
+    for (size_t lung = 0; lung < 2; ++lung) {
+      volume[lung] = find_gradient(w, lung, predicted, scratch);
+    }
+    for (size_t i = 0; i < SAMPLES; ++i) {
+      assert_int_equal(supine_doubt_sample(w->doubt, s, 9, i, xyz, NULL), SUPINE_OK);
+      for (size_t t = 0; t < w->fixture->triangles; ++t) {
+        turned[0] += is_turned(w, t, predicted, xyz);
+      }
+      assert_int_equal(supine_doubt_mend_sample(mend, xyz, NULL), SUPINE_OK);
+      for (size_t t = 0; t < w->fixture->triangles; ++t) {
+        turned[1] += is_turned(w, t, predicted, xyz);
+      }
+      for (size_t lung = 0; lung < 2; ++lung) {
+        assert_close(find_gradient(w, lung, xyz, scratch), volume[lung], 20);
+      }
+      for (size_t e = 0; e < 3 * VERTICES; ++e) {
+        square[e / 3] += pow((double)xyz[e] - (double)predicted[e], 2) / SAMPLES;
+      }
+    }
+    for (size_t i = 0; i < VERTICES; ++i) {
+      const double expected = variance[3 * i] + variance[3 * i + 1] + variance[3 * i + 2];
+      const double ratio = sqrt(square[i] / expected);
+      assert_true(ratio > 0.9 && ratio < 1.1);
+    }
+  }
+  print_message("%zu triangles were turned over, and %zu are\n", turned[0], turned[1]);
+  assert_true(turned[0] > 0 && turned[1] == 0);
+  free(space);
+}
+
 TEST(test_doubt_wrong_input_refused) {
   world *w = *state;
   supine_error error = {0};
@@ -290,6 +415,10 @@ TEST(test_doubt_wrong_input_refused) {
     assert_says(error.message, "point 1 is vertex");
   }
   assert_int_equal(supine_doubt_sample(w->doubt, STATES, 1, 1, xyz, &error), SUPINE_ERROR_ARGUMENT);
+  const supine_doubt_mend *mend = NULL;
+  assert_int_equal(supine_doubt_mend_prepare(w->doubt, STATES, space, &mend, &error),
+                   SUPINE_ERROR_ARGUMENT);
+  assert_says(error.message, "state 4: give one below 4");
   assert_int_equal(
       supine_doubt_frame_prepare(w->doubt, 2, (const size_t[]){1, 2}, space, &frame, &error),
       SUPINE_ERROR_ARGUMENT);

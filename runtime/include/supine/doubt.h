@@ -122,11 +122,38 @@ SUPINE_API supine_status supine_doubt_frame_errors(const supine_doubt_frame *fra
 /** Draw random lungs: the predicted positions of all vertices in state `state`, plus an error drawn
  * from the field. Samples of equal seed and index are equal in all states of the field, as far as
  * the states' errors are. Cost: 64 sines and cosines for each vertex and state of the field. The
- * volumes are not exact.
+ * volumes are not exact, and some triangles are turned over: supine_doubt_mend_sample.
  * @param xyz  [N, 3] mm, written
  * @retval SUPINE_ERROR_ARGUMENT  the state is out of range */
 SUPINE_API supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint64_t seed,
                                              size_t index, float *xyz, supine_error *error);
+
+/** What random lungs need to keep the volumes of a state, in the space of the caller. */
+typedef struct supine_doubt_mend supine_doubt_mend;
+
+/** Return the number of doubles of work space that supine_doubt_mend_prepare needs. */
+SUPINE_API size_t supine_doubt_mend_space(const supine_basis *basis);
+
+/** Prepare the mending of samples of one state of a field: find how the error of every vertex
+ * covaries with the volumes. Cost: some hundred evaluations of the kernel for each vertex and lung.
+ * @param space  [supine_doubt_mend_space(basis)]; keep it as long as `mend` is used
+ * @param mend   written; NULL after a failure, and where there is nothing to mend: the basis has no
+ *               closed surface of the lungs, or their error is 0, as in the state of the scan
+ * @retval SUPINE_ERROR_ARGUMENT  the state is out of range */
+SUPINE_API supine_status supine_doubt_mend_prepare(const supine_doubt *doubt, size_t state,
+                                                   double *space, const supine_doubt_mend **mend,
+                                                   supine_error *error);
+
+/** Mend a sample of the state: condition it on the predicted volume of each lung, which it then has
+ * within 0.01 mL, and give triangles that it turned over the mean error of their vertices. The
+ * covariance of mended samples is C - C g (g' C g)^-1 g' C, with the covariance C of
+ * supine_doubt_covariance and the change g of the volumes with the vertices. Cost: about ten
+ * passes over the triangles. Any number of threads may use one `mend`; NULL leaves the sample as it
+ * is.
+ * @param xyz  [N, 3] mm, of supine_doubt_sample; changed
+ * @retval SUPINE_ERROR_NUMERICAL  no such lungs were found */
+SUPINE_API supine_status supine_doubt_mend_sample(const supine_doubt_mend *mend, float *xyz,
+                                                  supine_error *error);
 
 #ifdef __cplusplus
 }

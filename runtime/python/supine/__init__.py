@@ -424,11 +424,16 @@ class Basis:
     def samples(self, state: Gravity, count: int, seed: int = 0, since: Optional[Gravity] = None, *,
                 another_day: bool = False) -> Floats:
         """Draw `count` plausible lungs around those computed for a state: positions [count, N, 3], mm. Their spread is
-        the expected error, before the best translation is taken out (a factor of 1.15). Their volumes are not exact."""
+        the expected error, before the best translation is taken out (a factor of 1.15). Lungs have the volumes of the
+        state and no folds; points inside them have no surface, and keep no volume. `seed` and the place in the array
+        decide a sample. The numbers are those of `supine deform --samples`."""
         field, _space = self._doubt([state], since, another_day)
+        space, mend = np.empty(_c.doubt_mend_space(self._c)), ctypes.c_void_p()
+        _c.doubt_mend_prepare(field, 0, space.ctypes.data, mend)
         made = np.empty((count, self.vertex_count, 3), _FLOAT)
         for index in range(count):
             _c.doubt_sample(field, 0, seed, index, made[index].ctypes.data)
+            _c.doubt_mend_sample(mend, made[index].ctypes.data)
         return made
 
     def registered_error(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
