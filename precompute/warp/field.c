@@ -116,7 +116,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
 }
 
 supine_status supine_warp_create(const supine_basis *basis, const supine_pose *pose,
-                                 supine_field *field, supine_error *error) {
+                                 const float *deviation, supine_field *field, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t n = info->vertex_count;
   supine_field made = {.nodes = {.voxel = SUPINE_VOXEL_F32, .channels = 3}};
@@ -142,6 +142,11 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
     return supine_error_memory(error, "a field of %zu nodes", count);
   }
   (void)supine_displace_range(basis, pose, 0, n, moved);
+  if (deviation != NULL) {
+    for (size_t i = 0; i < 3 * n; ++i) {
+      moved[i] += deviation[i];
+    }
+  }
   for (size_t i = 0; i < count; ++i) {
     below[i] = -INFINITY;
   }

@@ -21,13 +21,14 @@ typedef struct supine_field {
  * displacement is `largest` mm: 60 mm, or 1.5 times the largest displacement if that is more. */
 double supine_warp_fade(double largest);
 
-/** Compute the displacement field from the scan to a pose. It has a physical meaning only in the
+/** Compute the displacement field from the scan to a pose, plus `deviation` [N, 3], mm, of its
+ * vertices from there, or NULL. It has a physical meaning only in the
  * lungs, and at the grid nodes around them to which 'supine embed' extrapolated it. From the lungs
  * it falls to 0 over the distance of supine_warp_fade, and at the latest at the border of the
  * grid.
  * @param field  release with supine_warp_free */
 supine_status supine_warp_create(const supine_basis *basis, const supine_pose *pose,
-                                 supine_field *field, supine_error *error);
+                                 const float *deviation, supine_field *field, supine_error *error);
 void supine_warp_free(supine_field *field);
 
 /** Interpolate the field at a point. */
@@ -36,7 +37,8 @@ void supine_warp_at(const supine_field *field, const double point[3], double u[3
 /** Compute the displacement field from a pose (NULL: the scan) to another, as supine_warp_create.
  * Release `field` even after a failure. */
 supine_status supine_warp_between(const supine_basis *basis, const supine_pose *from,
-                                  const supine_pose *to, supine_field *field, supine_error *error);
+                                  const supine_pose *to, const float *deviation,
+                                  supine_field *field, supine_error *error);
 
 /** Count the cells that the field u turns over (det(I + du/dx) is not positive at their centre):
  * share[0] in the lungs, share[1] in the body around them, where the field fades out. Both are

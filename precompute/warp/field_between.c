@@ -44,12 +44,13 @@ static supine_status join(const supine_field *first, supine_field *second, supin
 }
 
 supine_status supine_warp_between(const supine_basis *basis, const supine_pose *from,
-                                  const supine_pose *to, supine_field *field, supine_error *error) {
+                                  const supine_pose *to, const float *deviation,
+                                  supine_field *field, supine_error *error) {
   SUPINE_FREED_BY(supine_warp_free) supine_field first = {0};
-  SUPINE_TRY(supine_warp_create(basis, to, field, error));
+  SUPINE_TRY(supine_warp_create(basis, to, deviation, field, error));
   if (from == NULL) {
     return SUPINE_OK;
   }
-  SUPINE_TRY(supine_warp_create(basis, from, &first, error));
+  SUPINE_TRY(supine_warp_create(basis, from, NULL, &first, error));
   return join(&first, field, error);
 }

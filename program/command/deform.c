@@ -10,6 +10,7 @@
 #include <supine/runtime.h>
 
 #include "program/command/deform_content.h"
+#include "program/command/deform_samples.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/facts.h"
@@ -25,28 +26,45 @@ typedef struct request {
   bool as_scanned;
   supine_frame frame;
   supine_deform_content content;
+  size_t samples, seed;
+  bool samples_given;
+  size_t sample; /* number of the sample that a row of --states asks for */
+  bool sample_given;
   const char *states; /* CSV file of states; NULL if the options give one state */
   /* Outputs in the columns output, labels and field of a row; the request owns these texts. */
   char *outputs[3];
 } request;
 
 #define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
+#define OUTPUT_ENDINGS SUPINE_MESH_ENDINGS ", .csv, .safetensors, .nrrd, .nii, .nii.gz or .mha"
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      "file to write: " SUPINE_MESH_ENDINGS
      "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
-     "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha",
-     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = ENDINGS},
+     "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha; samples are .safetensors",
+     SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = OUTPUT_ENDINGS},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
      "the images are read once for all states. An output is a surface, points, or an image: the "
      "image of --image or --labels, moved, or without these the displacement field. With --image "
      "and --labels, the column labels has the file of the moved labels; the column field has that "
-     "of the field. Each state's field is computed once. Paths are relative to the folder of LIST",
+     "of the field. Each state's field is computed once. With the column sample, a number from 0 "
+     "on, a row's outputs show that sample of --samples instead of the prediction, and state no "
+     "expected errors. Paths are relative to the folder of LIST",
      SUPINE_FILLS(request, states), .file = SUPINE_FILE_IN,
-     .partners =
-         "volume allow-folds from as-scanned frame vertices inverse image density labels rigid"},
+     .partners = "volume allow-folds from as-scanned frame seed vertices inverse image density "
+                 "labels rigid"},
+    {"samples", 0, "N",
+     "write N plausible lungs to -o FILE.safetensors instead of the computed one: all vertices, "
+     "positions [N, vertices, 3] in mm and LPS. They are drawn from the expected error, points "
+     "near each other with errors alike, and every sample of a surface has the volumes of the "
+     "state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % sure. "
+     "Samples of points inside the lungs have no surface, and their volumes are not exact",
+     SUPINE_FILLS(request, samples), SUPINE_SAYS_GIVEN(request, samples_given),
+     .range = {1.0, 100000.0}, .partners = "output seed posture gravity volume allow-folds"},
+    {"seed", 0, "S", "number that decides the samples: another one draws other lungs",
+     SUPINE_FILLS(request, seed), .standard = "0"},
     {.table = supine_options_volume, SUPINE_FILLS(request, volume)},
     {.table = supine_options_from_scan, SUPINE_FILLS(request, from)},
     {.table = supine_options_as_scanned, SUPINE_FILLS(request, as_scanned)},
@@ -62,8 +80,31 @@ static const char *frame_of(const supine_frame *frame) {
   return frame->hilum ? ", in the frame of the hilum" : "";
 }
 
+/* Find the expected errors of a state, its hilum, and its motion in the frame of --frame. */
+static supine_status find_errors(const supine_basis *basis, const request *wanted,
+                                 supine_deformation *moved, supine_errors *errors,
+                                 supine_error *error) {
+  SUPINE_TRY(supine_posed_errors(basis, &moved->state, &moved->from.state, errors, error));
+  SUPINE_TRY(supine_options_hilum(basis, &moved->state, &moved->from.state, wanted->frame.hilum,
+                                  &moved->hilum, error));
+  if (wanted->frame.points != NULL) {
+    const supine_state *states[2] = {&moved->state, &moved->from.state};
+    SUPINE_TRY(supine_options_fiducials(wanted->frame.points, basis, states, errors, moved->motion,
+                                        error));
+  }
+  if (wanted->frame.hilum) {
+    const supine_state scan = supine_basis_scan(basis);
+    SUPINE_TRY(
+        supine_options_hilum_expected(basis, &moved->state, &scan, &errors->position, error));
+    SUPINE_TRY(supine_options_hilum_expected(basis, &moved->state, &moved->from.state,
+                                             &errors->moved, error));
+  }
+  return SUPINE_OK;
+}
+
 static supine_status deform(const supine_basis *basis, const request *wanted, supine_error *error) {
   SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
+  SUPINE_ARENA arena = {0};
   supine_deformation moved = {.state = wanted->volume.state,
                               .from_given = wanted->from.given,
                               .allow_folds = wanted->volume.allow_folds,
@@ -77,21 +118,16 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
-  SUPINE_TRY(supine_posed_errors(basis, &moved.state, &moved.from.state, &errors, error));
-  SUPINE_TRY(supine_options_hilum(basis, &moved.state, &moved.from.state, wanted->frame.hilum,
-                                  &moved.hilum, error));
-  if (wanted->frame.points != NULL) {
-    const supine_state *states[2] = {&moved.state, &moved.from.state};
-    SUPINE_TRY(supine_options_fiducials(wanted->frame.points, basis, states, &errors, moved.motion,
-                                        error));
+  if (wanted->sample_given) { /* one of many lungs: what is expected of the prediction is not its */
+    const size_t n = supine_basis_get_info(basis)->vertex_count;
+    moved.deviation = supine_arena_take(&arena, 3 * n, sizeof *moved.deviation);
+    SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+    SUPINE_TRY(supine_command_deform_sample(basis, &moved.state, wanted->seed, wanted->sample,
+                                            moved.deviation, error));
+  } else {
+    SUPINE_TRY(find_errors(basis, wanted, &moved, &errors, error));
   }
-  if (wanted->frame.hilum) {
-    const supine_state scan = supine_basis_scan(basis);
-    SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &scan, &errors.position, error));
-    SUPINE_TRY(supine_options_hilum_expected(basis, &moved.state, &moved.from.state, &errors.moved,
-                                             error));
-  }
-  if (supine_basis_get_info(basis)->is_fields) {
+  if (supine_basis_get_info(basis)->is_fields && !wanted->sample_given) {
     SUPINE_TRY(supine_posed_simulator_error(basis, &moved.state, &errors.position, error));
     by = errors.position.sigma == NULL ? "" : simulator;
   }
@@ -126,6 +162,17 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   }
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &reason, "%s:%zu: ", csv->path, csv->line);
+  }
+  const char *const sample = supine_csv_text(csv, 5);
+  if (sample != NULL && sample[0] != '\0') {
+    row->sample_given = true;
+    const bool whole = supine_options_parse_count(sample, &row->sample);
+    SUPINE_REFUSE_IF(!whole, error, SUPINE_ERROR_ARGUMENT,
+                     "%s:%zu: sample '%s': give a whole number from 0 on", csv->path, csv->line,
+                     sample);
+    SUPINE_REFUSE_IF(row->frame.hilum || row->frame.points != NULL, error, SUPINE_ERROR_UNSUPPORTED,
+                     "%s:%zu: samples are in the frame of the body: leave --frame out", csv->path,
+                     csv->line);
   }
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
@@ -204,9 +251,9 @@ static supine_status add_row(batch *b, supine_error *error) {
 
 /* Make a request for each row of --states, and check all rows before any state is computed. */
 static supine_status read_rows(const char *basis, batch *b, supine_error *error) {
-  static const char *const columns[] = {"posture", "output", "labels", "field", "volume"};
+  static const char *const columns[] = {"posture", "output", "labels", "field", "volume", "sample"};
   SUPINE_FREED_BY(supine_csv_close) supine_csv csv = {0};
-  SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 5, 2, &csv, error));
+  SUPINE_TRY(supine_csv_open(b->wanted->states, columns, 6, 2, &csv, error));
   for (;;) {
     bool more = false;
     SUPINE_TRY(supine_csv_next(&csv, &more, error));
@@ -226,13 +273,39 @@ static supine_status read_rows(const char *basis, batch *b, supine_error *error)
   return SUPINE_OK;
 }
 
+/* Check the output file and the options of a single state. */
+static supine_status check_samples(const request *wanted, supine_error *error) {
+  const char *path = wanted->content.path;
+  const bool holds = path != NULL && supine_text_ends_in(path, ".safetensors");
+  SUPINE_REFUSE_IF(wanted->samples_given && !holds, error, SUPINE_ERROR_ARGUMENT,
+                   "--samples needs -o FILE.safetensors: give it");
+  SUPINE_REFUSE_IF(!wanted->samples_given && holds, error, SUPINE_ERROR_ARGUMENT,
+                   "%s: such files hold samples: give --samples N", path);
+  return wanted->samples_given ? SUPINE_OK
+                               : supine_command_deform_content_check(&wanted->content, error);
+}
+
+/* Write samples of a state. */
+static supine_status draw(const supine_basis *basis, const request *wanted, const char *made_by,
+                          supine_error *error) {
+  const supine_deform_samples samples = {.path = wanted->content.path,
+                                         .made_by = made_by,
+                                         .count = wanted->samples,
+                                         .seed = wanted->seed};
+  supine_state state = wanted->volume.state;
+  supine_pose pose;
+  SUPINE_TRY(supine_options_pose(basis, name, &state, &pose, error));
+  supine_options_tell_state(name, basis, &state, &pose);
+  return supine_command_deform_samples(&samples, basis, &state, error);
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   request *wanted = chosen;
   SUPINE_FREED_BY(end) batch b = {.wanted = wanted};
   if (wanted->states != NULL) {
     SUPINE_TRY(read_rows(given->operand[0], &b, error));
   } else {
-    SUPINE_TRY(supine_command_deform_content_check(&wanted->content, error));
+    SUPINE_TRY(check_samples(wanted, error));
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->volume.state, error));
     SUPINE_TRY(add_row(&b, error));
   }
@@ -243,7 +316,11 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     b.rows[i].content.source = wanted->content.source;
     b.rows[i].content.label_source = wanted->content.label_source;
     b.rows[i].content.tissue = &b.tissue;
-    SUPINE_TRY(deform(b.basis, &b.rows[i], error));
+    if (wanted->samples_given) {
+      SUPINE_TRY(draw(b.basis, &b.rows[i], given->made_by, error));
+    } else {
+      SUPINE_TRY(deform(b.basis, &b.rows[i], error));
+    }
   }
   return SUPINE_OK;
 }

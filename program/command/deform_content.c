@@ -180,6 +180,15 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
   }
 }
 
+/* Shift a row by the mean deviation of a sample at the vertices `order` [count]. */
+static void deviate(const float *deviation, const size_t *order, size_t count, supine_target *row) {
+  double back[3] = {0.0, 0.0, 0.0};
+  for (size_t i = 0; i < 3 * count; ++i) {
+    back[i % 3] -= (double)deviation[3 * order[i / 3] + i % 3] / (double)count;
+  }
+  supine_options_target_shift(row, back);
+}
+
 /* Write a CSV file with a row for each structure, or for each vertex if `each` is true. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, bool each, supine_error *error) {
@@ -199,6 +208,13 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   if (moved->registered) {
     for (size_t i = 0; i < count; ++i) {
       supine_options_fiducials_target(moved->motion, &rows[i]);
+    }
+  }
+  if (moved->deviation != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      const size_t first = each ? i : names.begin[i];
+      const size_t last = each ? i + 1 : names.begin[i + 1];
+      deviate(moved->deviation, names.order + first, last - first, &rows[i]);
     }
   }
   print_rows(moved, basis, rows, count, output.file);
@@ -355,7 +371,7 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   static const double told = 0.01;
   static const double allowed = 0.1;
   SUPINE_TRY(supine_warp_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
-                                 field, error));
+                                 moved->deviation, field, error));
   double folded[2];
   supine_warp_folded(field, folded);
   const double around = folded[1];
@@ -499,6 +515,17 @@ static void register_mesh(const supine_motion motion[2], supine_mesh *from, supi
   }
 }
 
+/* Add the deviation of a sample, if there is one, to a mesh and to a copy of its vertices. */
+static void deviate_surface(const float *deviation, supine_mesh *mesh, float *xyz) {
+  if (deviation == NULL) {
+    return;
+  }
+  for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+    xyz[i] += deviation[i];
+    mesh->vertices[i] += (double)deviation[i];
+  }
+}
+
 /* Write a surface, and print its largest displacement and its volume. */
 static supine_status write_surface(const char *path, const supine_basis *basis,
                                    supine_deformation *moved, supine_error *error) {
@@ -518,6 +545,7 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   SUPINE_TRY(supine_posed_mesh(basis, &moved->from.pose, &from, error));
   SUPINE_TRY(supine_posed_mesh(basis, &moved->pose, &mesh, error));
   (void)supine_deform(basis, &moved->pose, xyz);
+  deviate_surface(moved->deviation, &mesh, xyz);
   supine_normals(basis, xyz, normals);
   if (moved->subtract_hilum) {
     for (size_t i = 0; i < 3 * mesh.vertex_count; ++i) {

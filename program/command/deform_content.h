@@ -47,7 +47,8 @@ typedef struct supine_deformation {
   supine_options_reference_pose from; /* state in the input image, where displacements are 0 */
   bool allow_folds;                   /* whether folded fields cause only a warning */
   bool from_given;                    /* whether --from was given; otherwise `from` is the scan */
-  supine_errors errors;               /* of positions, and of displacements from `from` */
+  float *deviation;     /* [N, 3] of a sample from the pose, mm; NULL for the pose itself */
+  supine_errors errors; /* of positions, and of displacements from `from` */
   supine_hilum hilum;
   bool subtract_hilum;           /* whether outputs are in the frame of the hilum */
   bool registered;               /* whether outputs are after a registration at points */

@@ -66,6 +66,7 @@ deform lungs.safetensors --posture prone --volume rest+300 -o out/a.vtp
 deform points.safetensors --allow-folds --posture prone -o out/a.csv
 deform grid.safetensors --allow-folds --posture prone --inverse --field-out out/a.nrrd
 deform grid.safetensors --allow-folds --posture prone --image image.nrrd -o out/a.nrrd
+deform lungs.safetensors --posture prone --samples 2 -o out/a.safetensors
 compare lungs.safetensors --postures supine,prone
 compare lungs.safetensors --postures supine,prone --json
 compare lungs.safetensors --postures supine,prone -o out/a.html

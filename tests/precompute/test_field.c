@@ -56,7 +56,7 @@ static int teardown(void **state) {
 static supine_field made_field(void) {
   supine_field field;
   supine_error error;
-  if (supine_warp_create(grid, POSED(grid, weights, scales), &field, &error) != SUPINE_OK) {
+  if (supine_warp_create(grid, POSED(grid, weights, scales), NULL, &field, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
   return field;
@@ -181,11 +181,11 @@ TEST(test_field_border_and_outside_zero_without_folds) {
     double folded[2];
     make_grid(spacings[i]);
     grid = helper_open(in_folder("grid"));
-    assert_int_equal(supine_warp_create(grid, POSED(grid, weights, gains), &field, NULL),
+    assert_int_equal(supine_warp_create(grid, POSED(grid, weights, gains), NULL, &field, NULL),
                      SUPINE_OK);
     assert_int_equal(supine_warp_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
     assert_int_equal(supine_warp_between(grid, POSED(grid, weights, scales),
-                                         POSED(grid, weights, gains), &between, NULL),
+                                         POSED(grid, weights, gains), NULL, &between, NULL),
                      SUPINE_OK);
     double largest = 0.0;
     const float *u = field.nodes.values;
@@ -228,14 +228,14 @@ TEST(test_field_scan_below_full_measured_from_scan) {
   if (supine_inside_shells_create(surface, &below, &error) != SUPINE_OK) {
     fail_msg("%s", error.message);
   }
-  assert_int_equal(supine_warp_create(grid, &below.scan, &field, &error), SUPINE_OK);
+  assert_int_equal(supine_warp_create(grid, &below.scan, NULL, &field, &error), SUPINE_OK);
   const size_t count = field.nodes.size[0] * field.nodes.size[1] * field.nodes.size[2];
   for (size_t i = 0; i < 3 * count; ++i) {
     assert_true(fabs((double)((const float *)field.nodes.values)[i]) < 1e-4);
   }
   supine_warp_free(&field);
   /* Compare the field at a grid node in the lungs with the motion of a point embedded there. */
-  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, scales), &field, &error),
+  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, scales), NULL, &field, &error),
                    SUPINE_OK);
   size_t node = count / 2;
   while (!(((const float *)field.depth.values)[node] > 0.0F)) {
@@ -472,7 +472,8 @@ TEST(test_resample_scaled_density_keeps_mass) {
   supine_field inverse;
   supine_warp_residual residual;
   const double larger[2] = {-1.4, 1.2}; /* one lung inflates, the other deflates */
-  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, larger), &field, NULL), SUPINE_OK);
+  assert_int_equal(supine_warp_create(grid, POSED(grid, weights, larger), NULL, &field, NULL),
+                   SUPINE_OK);
   assert_int_equal(supine_warp_invert(&field, &inverse, &residual, NULL), SUPINE_OK);
   for (int lung = 0; lung < 2; ++lung) {
     for (int wall = 0; wall < 2; ++wall) {
@@ -637,8 +638,9 @@ TEST(test_resample_displacement_0_voxels_copied_exactly) {
 TEST(test_field_create_without_grid_refused) {
   supine_field field;
   supine_error error;
-  assert_int_equal(supine_warp_create(surface, POSED(surface, weights, scales), &field, &error),
-                   SUPINE_ERROR_FORMAT);
+  assert_int_equal(
+      supine_warp_create(surface, POSED(surface, weights, scales), NULL, &field, &error),
+      SUPINE_ERROR_FORMAT);
   assert_says(error.message, "holds no grid");
   assert_says(error.message, "embed an image, or a grid");
 }
@@ -652,7 +654,7 @@ static void check_malformed(const char *name, bool finite) {
   const supine_status opened = supine_basis_open(in_folder(name), &bad, &error);
   if (finite) {
     assert_int_equal(opened, SUPINE_OK);
-    assert_int_equal(supine_warp_create(bad, POSED(bad, weights, scales), &field, &error),
+    assert_int_equal(supine_warp_create(bad, POSED(bad, weights, scales), NULL, &field, &error),
                      SUPINE_ERROR_FORMAT);
     assert_says(error.message, "the grid in the basis is malformed");
   } else {

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: GPL-3.0-or-later */
+/* Draw plausible lungs from the random field of the expected error. */
+#include <math.h>
+#include <string.h>
+
+#include <supine/doubt.h>
+#include <supine/safetensors.h>
+
+#include "base/arena.h"
+
+#include "base/number.h"
+#include "program/command/deform_samples.h"
+#include "program/options/command.h"
+
+/* The field of a state. `mend` is NULL if the basis has no surface of the lungs, or no doubt. */
+typedef struct source {
+  const supine_basis *basis;
+  const supine_state *state;
+  const supine_doubt *field;
+  const supine_doubt_mend *mend;
+  size_t seed, vertices;
+  float *predicted; /* [vertices, 3] mm, from which samples deviate */
+  supine_arena arena;
+} source;
+
+static void end(source *s) {
+  supine_arena_free(&s->arena);
+}
+
+/* Prepare the members that `basis`, `state` and `seed` decide. */
+static supine_status begin(source *s, supine_error *error) {
+  const supine_doubt_task task = {.basis = s->basis, .state_count = 1, .states = s->state};
+  const size_t more = supine_doubt_mend_space(s->basis);
+  double *space = supine_arena_take(&s->arena, supine_doubt_space(1), sizeof *space);
+  double *mend = supine_arena_take(&s->arena, more, sizeof *mend);
+  supine_pose pose;
+  s->vertices = supine_basis_get_info(s->basis)->vertex_count;
+  s->predicted = supine_arena_take(&s->arena, 3 * s->vertices, sizeof *s->predicted);
+  SUPINE_TRY(supine_arena_check(&s->arena, error, "samples of %zu vertices", s->vertices));
+  SUPINE_TRY(supine_basis_pose(s->basis, s->state, &pose, error));
+  (void)supine_deform(s->basis, &pose, s->predicted);
+  SUPINE_TRY(supine_doubt_prepare(&task, space, &s->field, error));
+  return supine_doubt_mend_prepare(s->field, 0, mend, &s->mend, error);
+}
+
+static supine_status draw(const source *s, size_t index, float *xyz, supine_error *error) {
+  SUPINE_TRY(supine_doubt_sample(s->field, 0, s->seed, index, xyz, error));
+  return supine_doubt_mend_sample(s->mend, xyz, error);
+}
+
+supine_status supine_command_deform_sample(const supine_basis *basis, const supine_state *state,
+                                           size_t seed, size_t index, float *deviation,
+                                           supine_error *error) {
+  SUPINE_FREED_BY(end) source s = {.basis = basis, .state = state, .seed = seed};
+  SUPINE_TRY(begin(&s, error));
+  SUPINE_TRY(draw(&s, index, deviation, error));
+  for (size_t i = 0; i < 3 * s.vertices; ++i) {
+    deviation[i] -= s.predicted[i];
+  }
+  return SUPINE_OK;
+}
+
+/* Write samples, with the triangles and names of their vertices. */
+static supine_status save(const supine_deform_samples *wanted, const source *s, const char *state,
+                          const float *positions, supine_error *error) {
+  static const char *const copied[] = {"triangles", "names", "part"};
+  supine_tensor tensors[5] = {
+      {"positions", SUPINE_F32, 3, {wanted->count, s->vertices, 3}, positions},
+      {"predicted", SUPINE_F32, 2, {s->vertices, 3}, s->predicted}};
+  size_t tensor_count = 2;
+  char seed[24];
+  for (size_t i = 0; i < sizeof copied / sizeof *copied; ++i) {
+    const supine_tensor *own = supine_basis_tensor(s->basis, copied[i]);
+    if (own != NULL) {
+      tensors[tensor_count++] = *own;
+    }
+  }
+  (void)snprintf(seed, sizeof seed, "%zu", s->seed);
+  const supine_metadata metadata[] = {
+      {"format", "supine-samples"},
+      {"version", "1"},
+      {"units", "mm"},
+      {"axes", "LPS"},
+      {"state", state},
+      {"seed", seed},
+      {"volume", s->mend != NULL ? "that of the state in every sample" : "not exact"},
+      {"made_by", wanted->made_by}};
+  return supine_safetensors_write(wanted->path, tensors, tensor_count, metadata,
+                                  sizeof metadata / sizeof *metadata, error);
+}
+
+supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
+                                            const supine_basis *basis, const supine_state *state,
+                                            supine_error *error) {
+  SUPINE_FREED_BY(end) source s = {.basis = basis, .state = state, .seed = wanted->seed};
+  char text[160];
+  double square = 0.0;
+  SUPINE_TRY(begin(&s, error));
+  const size_t each = 3 * s.vertices;
+  float *positions = supine_arena_take(&s.arena, wanted->count, each * sizeof *positions);
+  SUPINE_TRY(supine_arena_check(&s.arena, error,
+                                "%zu samples of %zu vertices: draw fewer, with several seeds",
+                                wanted->count, s.vertices));
+  supine_options_signals_catch(true);
+  SUPINE_FREED_BY(supine_options_progress_end)
+  supine_progress progress = supine_options_progress_begin("samples");
+  for (size_t i = 0; i < wanted->count; ++i) {
+    float *xyz = positions + each * i;
+    SUPINE_TRY(draw(&s, i, xyz, error));
+    for (size_t e = 0; e < each; ++e) {
+      square += pow((double)xyz[e] - (double)s.predicted[e], 2.0);
+    }
+    const bool goes_on =
+        supine_options_progress_step(&progress, (double)(i + 1) / (double)wanted->count);
+    SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
+  }
+  (void)supine_state_describe(state, text, sizeof text);
+  SUPINE_TRY(save(wanted, &s, text, positions, error));
+  (void)supine_print(stdout,
+                     "%s: %zu sample%s of %zu point%s, %s, seed %zu: %.1f mm (RMS) from the "
+                     "prediction%s\n",
+                     wanted->path, wanted->count, wanted->count == 1 ? "" : "s", s.vertices,
+                     s.vertices == 1 ? "" : "s", text, wanted->seed,
+                     sqrt(square / (double)(s.vertices * wanted->count)),
+                     s.mend != NULL ? ", each with the volumes of the state" : "");
+  return SUPINE_OK;
+}
