@@ -79,6 +79,21 @@ static void close_studio(studio *s) {
   supine_basis_close(s->basis);
 }
 
+/* Warn of names that are written wrongly without pango. */
+static void tell_letters(const studio *s) {
+  enum { FIRST = 0xD6 }; /* smallest byte of a letter from U+0580 on: Hebrew, Arabic, Thai, ... */
+  bool shaped = false;
+  for (size_t i = 0; i < s->names.count; ++i) {
+    for (const char *at = s->names.text[i]; *at != '\0'; ++at) {
+      shaped = shaped || (unsigned char)*at >= FIRST;
+    }
+  }
+  if (shaped && !supine_render_shapes_text()) {
+    supine_options_say(name, "warning: pango is not installed, so that names in Arabic, Hebrew and "
+                             "other scripts may be written wrongly: install libpangocairo-1.0");
+  }
+}
+
 static supine_status open_studio(studio *s, const char *path, supine_error *error) {
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, s->wanted->volume.allow_folds,
                                        &s->basis, error));
@@ -89,6 +104,7 @@ static supine_status open_studio(studio *s, const char *path, supine_error *erro
     SUPINE_TRY(
         supine_options_inside_open(s->basis, s->wanted->inside, &s->inside, &s->names, error));
     s->score = supine_arena_zeros(&s->arena, s->names.count, sizeof *s->score);
+    tell_letters(s);
   }
   const size_t n = supine_basis_get_info(s->basis)->vertex_count;
   for (size_t i = 0; i < s->postures.count; ++i) {
@@ -149,11 +165,11 @@ static supine_status score_panel(studio *s, size_t i, supine_error *error) {
 static void tell_target(studio *s, size_t i) {
   drawn *shown = &s->shown[i];
   const supine_target *t = &shown->marks.selected;
-  char target[40];
+  char target[SUPINE_SHOWN_NAME_SIZE];
   shown->note[0] = '\0';
   if (t->moved < 0.05) {
     (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "where %s is",
-                            supine_text_shorten(t->name, sizeof target, target));
+                            supine_options_shown_name(t->name, 36, target));
     return;
   }
   (void)supine_print_text(shown->figure, sizeof shown->figure, "%.1f mm", t->moved);

@@ -7,6 +7,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/text.h"
+#include "base/utf8.h"
 #include "base/vec3.h"
 
 #include "program/options/basis_input.h"
@@ -309,23 +310,36 @@ typedef struct appearance {
   bool named;
 } appearance;
 
+const char *supine_options_shown_name(const char *name, size_t letters,
+                                      char shown[SUPINE_SHOWN_NAME_SIZE]) {
+  char cut[SUPINE_SHOWN_NAME_SIZE - 8]; /* the rest holds the two marks of an isolated text */
+  size_t size = 1;
+  for (size_t i = 0; i < letters && name[size - 1] != '\0'; ++i) {
+    size += supine_utf8_length(name + size - 1, strlen(name + size - 1));
+  }
+  (void)supine_text_shorten(name, size < sizeof cut ? size : sizeof cut, cut);
+  (void)snprintf(shown, SUPINE_SHOWN_NAME_SIZE,
+                 supine_render_shapes_text() ? "\342\201\250%s\342\201\251" : "%s", cut);
+  return shown;
+}
+
 /* Make the label of a structure, at its middle. */
 static void add_label(const appearance *look, const supine_target *t, supine_options_marks *marks) {
   supine_mark *middle = &marks->mark[marks->marks.count++];
-  char label[32];
+  char label[SUPINE_SHOWN_NAME_SIZE];
   for (size_t k = 0; k < 3; ++k) {
     middle->xyz[k] = (float)t->at[k];
     middle->from[k] = (float)(t->at[k] - t->move[k]);
   }
   (void)supine_print_text(marks->label[look->part], sizeof marks->label[look->part], "%s",
-                          supine_text_shorten(t->name, sizeof label, label));
+                          supine_options_shown_name(t->name, 28, label));
   if (t->moved > t->moved_error && look->kind == SUPINE_MARK_TARGET) {
-    /* A mark from left to right keeps the number behind a name in Arabic or Hebrew. */
-    supine_text_add(marks->label[look->part], sizeof marks->label[look->part], "%s %.1f mm",
-                    supine_render_shapes_text() ? "\342\200\216" : "", t->moved);
+    supine_text_add(marks->label[look->part], sizeof marks->label[look->part], " %.1f mm",
+                    t->moved);
   }
   middle->label = marks->label[look->part];
   middle->kind = look->kind;
+  middle->tint = look->tint;
   middle->moved =
       t->moved > t->moved_error || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
   middle->expected = t->error > 0.0 && t->moved >= 0.05 ? (float)t->error : 0.0F;
@@ -355,7 +369,8 @@ static void fill_marks(const supine_options_names *names, const appearance *look
     mark->moved = t->moved >= least;
   }
   if (count > 0 && look->named) {
-    marks->mark[marks->marks.count].reach = (float)reach;
+    const bool shell = look->kind == SUPINE_MARK_ANATOMY; /* its name is written on it */
+    marks->mark[marks->marks.count].reach = shell ? 0.0F : (float)reach;
     add_label(look, t, marks);
   }
 }
@@ -375,7 +390,7 @@ static void show_structures(const supine_options_names *names, const supine_targ
     } else if (rank == 0) {
       look.kind = SUPINE_MARK_SELECTED;
     }
-    look.named = !t->anatomy && rank < SUPINE_LABELS_MAX;
+    look.named = t->anatomy ? look.tint < SUPINE_RENDER_TINTS : rank < SUPINE_LABELS_MAX;
     marks->unnamed += !t->anatomy && !look.named;
     fill_marks(names, &look, t, after, before, marks);
     if (rank == 0) {

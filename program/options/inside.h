@@ -80,6 +80,14 @@ void supine_options_target_shift(supine_target *target, const double shift[3]);
  * the displacement. */
 json_t *supine_options_target_json(const supine_target *target);
 
+enum { SUPINE_SHOWN_NAME_SIZE = 128 }; /* bytes that hold supine_options_shown_name */
+
+/* Write a name as a line of a picture shows it: its first letters, at most `letters`, and kept
+ * apart from the rest of the line where text is shaped, as it may be written from right to left.
+ * Return `shown`. */
+const char *supine_options_shown_name(const char *name, size_t letters,
+                                      char shown[SUPINE_SHOWN_NAME_SIZE]);
+
 enum { SUPINE_LABELS_MAX = 8 }; /* largest number of targets that a picture names */
 
 /* Raise score[i] to the displacement of target i, in multiples of its expected error or, where that
@@ -91,14 +99,15 @@ void supine_options_targets_score(const supine_target *targets, size_t count, do
 typedef struct supine_options_marks {
   supine_marks marks;
   supine_mark *mark;
-  char (*label)[64];
+  char (*label)[SUPINE_SHOWN_NAME_SIZE + 32];
   supine_target selected; /* the target with the largest score, of which a caption tells */
   size_t unnamed;         /* number of targets without a label */
   supine_arena arena;
 } supine_options_marks;
 
 /* Make the marks that show the structures in pose[1], with arrows from where they were in pose[0].
- * Those that `marks` held before are freed. Names of up to SUPINE_LABELS_MAX targets are written.
+ * Those that `marks` held before are freed. Names of up to SUPINE_LABELS_MAX targets, and of the
+ * structures that have a colour of their own, are written.
  * @param errors  as supine_options_targets_find
  * @param score  [names->count] of supine_options_targets_score */
 supine_status supine_options_marks_make(const supine_basis *inside,

@@ -436,7 +436,7 @@ TEST(test_render_look_shell_is_pink_displacement_is_coloured) {
 }
 
 /* The selected target is orange, with a ring of its expected error unless it has not moved; airways,
- * which are longer than a target, are blue and have no name. */
+ * which are longer than a target, are blue. */
 TEST(test_render_selected_target_orange_ringed_when_moved_anatomy_blue) {
   static const int orange[2][3] = {{170, 60, 0}, {255, 170, 110}};
   static const int blue[2][3] = {{40, 70, 110}, {130, 170, 255}};
@@ -615,6 +615,27 @@ TEST(test_render_pdf_and_svg_have_their_format) {
     assert_true(size > 10000 && strncmp(bytes, begin[i][1], strlen(begin[i][1])) == 0);
     assert_null(memmem(bytes, size, "CreationDate", 12)); /* the bytes do not depend on the time */
     free(bytes);
+  }
+}
+
+/* Names of scripts that only pango can shape are told of once where it cannot be loaded. */
+TEST(test_render_without_pango_warns_once_of_names_it_would_shape) {
+  static const char *const name[] = {"n\u00F3dulo", "\u05D2\u05D9\u05D3\u05D5\u05DC"};
+  test_write(in_folder("libpango-1.0.so.0"), ""); /* no library */
+  for (size_t i = 0; i < 2; ++i) {
+    char csv[128];
+    (void)snprintf(csv, sizeof csv, "name,x,y,z\n%s,-80,-120,-90\nb%s,80,-120,-90\n", name[i],
+                   name[i]);
+    test_write(in_folder("names.csv"), csv);
+    EXPECT(0, "", "embed lungs.safetensors names.csv -o names.safetensors");
+    assert_int_equal(setenv("LD_LIBRARY_PATH", folder, 1), 0);
+    const bool drawn = render("lungs.safetensors --inside names.safetensors "
+                              "--posture supine,left --size 300x240 -o names.png");
+    assert_int_equal(unsetenv("LD_LIBRARY_PATH"), 0);
+    if (!drawn) {
+      skip();
+    }
+    assert_int_equal(count_words(printed, "pango is not installed"), i);
   }
 }
 

@@ -41,10 +41,10 @@ float supine_render_camera_scale(const camera *c, const corner *at);
 
 /* What is drawn, which decides its colours. */
 typedef enum material {
-  MATERIAL_MAP,     /* lungs in the colours of their values, opaque */
-  MATERIAL_SHELL,   /* lungs as a translucent shell, lit at the rim */
-  MATERIAL_GHOST,   /* a target where it was: white, translucent */
-  MATERIAL_TARGET,  /* opaque */
+  MATERIAL_MAP,      /* lungs in the colours of their values, opaque */
+  MATERIAL_SHELL,    /* lungs as a translucent shell, lit at the rim */
+  MATERIAL_GHOST,    /* a target where it was: white, translucent */
+  MATERIAL_TARGET,   /* opaque */
   MATERIAL_SELECTED, /* opaque */
   MATERIAL_ANATOMY,  /* a translucent shell in one of the tints */
   MATERIAL_DOT,      /* a point of anatomy: opaque, in one of the tints */
@@ -63,11 +63,13 @@ typedef struct fragment {
 
 enum { SHADES = 4096 };
 
-/* Tables for colours of a map under light. */
+/* Tables of colours, and for those of a map under light. */
 typedef struct shades {
-  float colours[SHADES + 1][3]; /* colour map, linear RGB, 0 to 1 */
-  float encode[SHADES + 1];     /* [i] sRGB of the linear light i / SHADES, 0 to 1 */
-  float largest;                /* value that the last colour shows, mm */
+  float colours[SHADES + 1][3];       /* colour map, linear RGB, 0 to 1 */
+  float encode[SHADES + 1];           /* [i] sRGB of the linear light i / SHADES, 0 to 1 */
+  float largest;                      /* value that the last colour shows, mm */
+  float target[2][3];                 /* SUPINE_PALETTE_TARGETS, sRGB, 0 to 1 */
+  float tint[SUPINE_RENDER_TINTS][3]; /* SUPINE_PALETTE_ANATOMY, sRGB, 0 to 1 */
 } shades;
 
 /* The surface of a torso around the lungs. */

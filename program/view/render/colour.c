@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* The colour maps: colours at equal distances along curves in OKLab. Lightness rises along each
- * curve, so that colours keep their order in grey copies and for any colour vision.
- * [Ottosson2020] B. Ottosson, "A perceptual color space for image processing". */
+/* The palettes, and the colour maps: colours at equal distances along curves in OKLab. Lightness
+ * rises along each curve, so that colours keep their order in grey copies and for any colour
+ * vision. [Ottosson2020] B. Ottosson, "A perceptual color space for image processing". */
 #include <math.h>
 #include <stdint.h>
 
@@ -57,4 +57,25 @@ double supine_render_bar_step(double value) {
 double supine_render_bar_end(double value) {
   const double step = supine_render_bar_step(value);
   return value > 0 ? step * ceil(value / step - 1e-9) : 5 * step;
+}
+
+uint32_t supine_render_palette(supine_palette palette, size_t i) {
+  enum { POSTURES = 7, TARGETS = 2 };
+  static const uint32_t targets[TARGETS] = {0x66bdc2, 0xfa7d33};
+  static const uint32_t anatomy[SUPINE_RENDER_TINTS] = {0x4f8ae0, 0xa670e0, 0x3f9d63,
+                                                        0xb08a1e, 0xd0587e, 0x7a8797};
+  /* [OkabeIto2008] M. Okabe and K. Ito, "Color Universal Design". */
+  static const uint32_t postures[POSTURES] = {0x0072b2, 0xd55e00, 0x009e73, 0xcc79a7,
+                                              0x56b4e9, 0xe69f00, 0x8c8c8c};
+  switch (palette) {
+  case SUPINE_PALETTE_TARGETS:
+    return targets[i % TARGETS];
+  case SUPINE_PALETTE_ANATOMY:
+    return anatomy[i % SUPINE_RENDER_TINTS];
+  case SUPINE_PALETTE_POSTURES:
+    return postures[i % POSTURES];
+  case SUPINE_PALETTE_COUNT:
+    break;
+  }
+  return 0;
 }

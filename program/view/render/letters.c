@@ -15,12 +15,14 @@
   EACH(cairo_, show_text) EACH(cairo_, text_extents) EACH(cairo_, text_path)
 
 #define PANGO_FUNCTIONS(EACH)                                                                      \
+  EACH(pango_, context_set_base_dir)                                                               \
   EACH(pango_, font_description_free)                                                              \
   EACH(pango_, font_description_new)                                                               \
   EACH(pango_, font_description_set_absolute_size)                                                 \
   EACH(pango_, font_description_set_family)                                                        \
   EACH(pango_, font_description_set_weight)                                                        \
   EACH(pango_, layout_get_baseline)                                                                \
+  EACH(pango_, layout_get_context)                                                                 \
   EACH(pango_, layout_get_size)                                                                    \
   EACH(pango_, layout_set_auto_dir)                                                                \
   EACH(pango_, layout_set_font_description) EACH(pango_, layout_set_text)
@@ -61,7 +63,9 @@ static PangoLayout *layout_of(cairo_t *cr, const letters *face, const char *word
   pango.font_description_set_absolute_size(font, face->size * PANGO_SCALE);
   pango.layout_set_font_description(line, font);
   pango.font_description_free(font);
-  pango.layout_set_auto_dir(line, FALSE); /* captions are English, whatever the names in them */
+  /* Captions are English: a name from right to left does not turn the number after it. */
+  pango.context_set_base_dir(pango.layout_get_context(line), PANGO_DIRECTION_LTR);
+  pango.layout_set_auto_dir(line, FALSE);
   pango.layout_set_text(line, words, -1);
   return line;
 }

@@ -11,7 +11,8 @@
 /* clang-format off */
 #define FUNCTIONS(EACH)                                                                            \
   EACH(cairo_, arc) EACH(cairo_, close_path) EACH(cairo_, fill) EACH(cairo_, fill_preserve)        \
-  EACH(cairo_, line_to) EACH(cairo_, move_to) EACH(cairo_, new_path) EACH(cairo_, set_dash)        \
+  EACH(cairo_, line_to) EACH(cairo_, move_to) EACH(cairo_, new_path) EACH(cairo_, rectangle)       \
+  EACH(cairo_, set_dash)                                                                           \
   EACH(cairo_, set_line_width) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)          \
   EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)
 /* clang-format on */
@@ -19,8 +20,8 @@
 static struct { FUNCTIONS(SUPINE_LIBRARY_MEMBER) } cairo;
 
 static const double pi = 3.14159265358979323846;
-static const double name_size = 0.68;  /* height of names, in heights of the picture's letters */
-static const double least_ball = 4.0;  /* smallest radius of a ball, pixels, as in draw.c */
+static const double name_size = 0.68; /* height of names, in heights of the picture's letters */
+static const double least_ball = 4.0; /* smallest radius of a ball, pixels, as in draw.c */
 
 /* A mark with a label: where it is drawn, and where its name is. All lengths are pixels. */
 typedef struct shown {
@@ -28,7 +29,7 @@ typedef struct shown {
   double at[2], from[2];
   double radius; /* of the ball, or of a circle around the mesh */
   double ring;   /* radius of the ball and the expected error around it; 0 for no ring */
-  bool arrow; /* whether it moved by more than its radius */
+  bool arrow;    /* whether it moved by more than its radius */
   double box[4]; /* of the name: left, top, right, bottom */
 } shown;
 
@@ -39,7 +40,9 @@ typedef struct sketch {
   letters face; /* of names */
   double width, height;
   size_t count;
-  shown *mark; /* [count] */
+  shown *mark;       /* [count] */
+  size_t ball_count; /* targets without a name */
+  double (*ball)[3]; /* [ball_count] position and radius */
 } sketch;
 
 supine_status supine_render_marks_load(supine_error *error) {
@@ -125,6 +128,11 @@ static double line_distance(const double a[2], const double b[2], const double a
   return hypot(a[0] + share * d[0] - at[0], a[1] + share * d[1] - at[1]);
 }
 
+/* Return whether a mark is that of a large structure, on which its name is written. */
+static bool is_shell(const shown *m) {
+  return m->mark->kind == SUPINE_MARK_ANATOMY;
+}
+
 /* Return what a name in `box` would hide: balls, rings and ghosts, and names 0 to `before` - 1, and
  * what the line to its mark would cross. */
 static double cost_of(const sketch *s, size_t own, const double box[4]) {
@@ -132,11 +140,15 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
   double end[2];
   double cost = 0.0;
   nearest_of(box, s->mark[own].at, end);
+  for (size_t i = 0; i < s->ball_count; ++i) {
+    cost += box_distance(box, s->ball[i]) < s->ball[i][2] ? 0.5 : 0.0;
+  }
   for (size_t i = 0; i < s->count; ++i) {
     const shown *m = &s->mark[i];
-    cost += box_distance(box, m->at) < fmax(m->radius, m->ring) + gap;
+    cost += !is_shell(m) && box_distance(box, m->at) < fmax(m->radius, m->ring) + gap;
     cost += m->arrow && box_distance(box, m->from) < m->radius + gap;
-    cost += i != own && line_distance(s->mark[own].at, end, m->at) < m->radius + gap;
+    cost +=
+        i != own && !is_shell(m) && line_distance(s->mark[own].at, end, m->at) < m->radius + gap;
     if (i < own) {
       const bool apart = box[0] > m->box[2] + gap || m->box[0] > box[2] + gap ||
                          box[1] > m->box[3] + gap || m->box[1] > box[3] + gap;
@@ -145,18 +157,25 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
       cost += line_distance(s->mark[own].at, end, middle) < s->face.size;
     }
   }
-  const bool inside =
-      box[0] >= 0.0 && box[2] <= s->width && box[1] >= 0.0 && box[3] <= s->height;
+  const bool inside = box[0] >= 0.0 && box[2] <= s->width && box[1] >= 0.0 && box[3] <= s->height;
   return cost + (inside ? 0.0 : 16.0);
 }
 
-/* Place the name of a mark where it hides least, near its mark and rather beside it. */
+/* Return the width of a name, with the square in its colour before that of a large structure. */
+static double width_of(const sketch *s, const shown *m) {
+  return supine_render_letters_width(s->cr, &s->face, m->mark->label) +
+         (is_shell(m) ? s->face.size : 0.0);
+}
+
+/* Place the name of a mark where it hides least, near its mark and rather beside it; on its mark,
+ * if that is a large structure. */
 static void place(const sketch *s, size_t own) {
   enum { WAYS = 16, STEPS = 7 };
   shown *m = &s->mark[own];
   const double font = s->style->font;
-  const double width = supine_render_letters_width(s->cr, &s->face, m->mark->label);
-  const double start = fmax(m->radius, m->ring) + 0.5 * font;
+  const double edge = 0.3 * font; /* space beside names at the edges of the picture */
+  const double width = width_of(s, m);
+  const double start = is_shell(m) ? 0.0 : fmax(m->radius, m->ring) + 0.5 * font;
   double best = DBL_MAX;
   for (int way = 0; way < WAYS; ++way) {
     const double angle = 2 * pi * way / WAYS;
@@ -164,8 +183,11 @@ static void place(const sketch *s, size_t own) {
       const double away = start + 0.8 * font * step;
       const double x = m->at[0] + away * cos(angle);
       const double y = m->at[1] - away * sin(angle);
-      const double beside = cos(angle) >= 0.0 ? x : x - width;
-      const double left = fmax(0.0, fmin(beside, s->width - width));
+      double beside = cos(angle) >= 0.0 ? x : x - width;
+      if (is_shell(m)) {
+        beside = x - width / 2;
+      }
+      const double left = fmax(edge, fmin(beside, s->width - width - edge));
       const double box[4] = {left, y - 0.55 * s->face.size, left + width, y + 0.55 * s->face.size};
       const double cost = cost_of(s, own, box) + 0.12 * step + 0.1 * fabs(sin(angle));
       if (cost < best) {
@@ -191,35 +213,51 @@ static void name(const sketch *s, const shown *m) {
     cairo.line_to(s->cr, end[0], end[1]);
     cairo.stroke(s->cr);
   }
-  const double baseline = (m->box[1] + m->box[3]) / 2 + 0.35 * size;
-  supine_render_letters_path(s->cr, &s->face, m->box[0], baseline, m->mark->label);
+  const double middle = (m->box[1] + m->box[3]) / 2;
+  const double left = m->box[2] - supine_render_letters_width(s->cr, &s->face, m->mark->label);
+  supine_render_letters_path(s->cr, &s->face, left, middle + 0.35 * size, m->mark->label);
   cairo.set_source_rgba(s->cr, ground[0], ground[1], ground[2], 0.85);
   cairo.set_line_width(s->cr, size * 0.25);
   cairo.stroke_preserve(s->cr);
   colour(s->cr, s->style->ink);
   cairo.fill(s->cr);
+  if (is_shell(m)) {
+    const uint32_t tint = supine_render_palette(SUPINE_PALETTE_ANATOMY, m->mark->tint);
+    cairo.rectangle(s->cr, m->box[0], middle - 0.3 * size, 0.6 * size, 0.6 * size);
+    cairo.set_source_rgb(s->cr, (tint >> 16) / 255.0, (tint >> 8 & 255U) / 255.0,
+                         (tint & 255U) / 255.0);
+    cairo.fill(s->cr);
+  }
 }
 
-/* Project the marks that have a label, and fill s->mark [count]. */
+/* Project the marks, and fill s->mark [count] with those that have a label, those of large
+ * structures last, and s->ball [ball_count]. */
 static void project(sketch *s, const supine_basis *basis, const supine_scene *scene,
                     double (*pixel)[3]) {
   const supine_marks *all = scene->content;
   double(*from)[3] = pixel + all->count;
   supine_render_project(basis, scene, all, false, pixel);
   supine_render_project(basis, scene, all, true, from);
-  for (size_t i = 0; i < all->count; ++i) {
+  for (size_t n = 0; n < 2 * all->count; ++n) {
+    const size_t i = n % all->count;
     const supine_mark *mark = &all->mark[i];
-    if (mark->label != NULL) {
+    const bool shell = mark->kind == SUPINE_MARK_ANATOMY;
+    if (n < all->count && !shell && mark->radius > 0.0F) {
+      double *ball = s->ball[s->ball_count++];
+      memcpy(ball, pixel[i], 2 * sizeof *ball);
+      ball[2] = fmax(least_ball, (double)mark->radius * pixel[i][2]);
+    }
+    if (mark->label != NULL && shell == (n >= all->count)) {
       const double moved = hypot(pixel[i][0] - from[i][0], pixel[i][1] - from[i][1]);
       const double radius = fmax(least_ball, (double)mark->reach * pixel[i][2]);
       const bool ringed = mark->kind == SUPINE_MARK_SELECTED && mark->expected > 0.0F;
-      s->mark[s->count++] = (shown){
-          .mark = mark,
-          .at = {pixel[i][0], pixel[i][1]},
-          .from = {from[i][0], from[i][1]},
-          .radius = radius,
-          .ring = ringed ? (double)(mark->reach + mark->expected) * pixel[i][2] : 0.0,
-          .arrow = mark->moved && moved > radius && mark->kind != SUPINE_MARK_ANATOMY};
+      s->mark[s->count++] =
+          (shown){.mark = mark,
+                  .at = {pixel[i][0], pixel[i][1]},
+                  .from = {from[i][0], from[i][1]},
+                  .radius = radius,
+                  .ring = ringed ? (double)(mark->reach + mark->expected) * pixel[i][2] : 0.0,
+                  .arrow = mark->moved && moved > radius && mark->kind != SUPINE_MARK_ANATOMY};
     }
   }
 }
@@ -233,7 +271,8 @@ supine_status supine_render_marks_draw(cairo_t *cr, const marks_style *style,
               .face = {name_size * style->font, false},
               .width = (double)scene->width,
               .height = (double)scene->height,
-              .mark = supine_arena_take(&arena, count, sizeof *s.mark)};
+              .mark = supine_arena_take(&arena, count, sizeof *s.mark),
+              .ball = supine_arena_take(&arena, count, sizeof *s.ball)};
   double(*pixel)[3] = supine_arena_take(&arena, count, 2 * sizeof *pixel);
   if (arena.failed) {
     return SUPINE_ERROR_MEMORY;

@@ -77,7 +77,10 @@ typedef struct layout {
   double heading_height;
   double footer_height;  /* height of the area below the cells, which holds the colour bar */
   double caption_height; /* height of the lowest part of the footer, which holds the caption */
-  size_t caption_lines;
+  letters small;         /* of the footer's words and the caption */
+  double step;           /* distance of their lines */
+  double room;           /* width of the lines */
+  bool beside;           /* whether the remark is beside the legend, and not below it */
 } layout;
 
 /* What draws a picture. */
@@ -117,6 +120,43 @@ static double fitted_text(cairo_t *cr, double x, double y, const letters *face, 
   fitted.size *= fmin(1.0, room / width);
   text(cr, &fitted, x, y, 0.0, words);
   return fmin(width, room);
+}
+
+enum { LINE_SIZE = 512 };
+
+/* Copy the words of the next line of a text, broken at a blank, to `line`. Return the rest of the
+ * text. */
+static const char *next_line(cairo_t *cr, const letters *face, double room, const char *words,
+                             char line[LINE_SIZE]) {
+  size_t fits = 0;
+  for (size_t length = 1; length + 1 < LINE_SIZE && words[length - 1] != '\0'; ++length) {
+    if (words[length] == ' ' || words[length] == '\0') {
+      (void)snprintf(line, LINE_SIZE, "%.*s", (int)length, words);
+      if (fits > 0 && supine_render_letters_width(cr, face, line) > room) {
+        break;
+      }
+      fits = length;
+    }
+  }
+  (void)snprintf(line, LINE_SIZE, "%.*s", (int)fits, words);
+  return words + fits + (words[fits] == ' ');
+}
+
+static size_t count_lines(cairo_t *cr, const letters *face, double room, const char *words) {
+  size_t count = 0;
+  for (char line[LINE_SIZE]; words != NULL && *words != '\0'; ++count) {
+    words = next_line(cr, face, room, words, line);
+  }
+  return count;
+}
+
+/* Draw a text in lines of `room` pixels, `step` apart, from the baseline y on. */
+static void paragraph(cairo_t *cr, const letters *face, double x, double y, double room,
+                      double step, const char *words) {
+  for (char line[LINE_SIZE]; *words != '\0'; y += step) {
+    words = next_line(cr, face, room, words, line);
+    (void)fitted_text(cr, x, y, face, room, line);
+  }
 }
 
 static void rounded(cairo_t *cr, double x, double y, double width, double height, double radius) {
@@ -217,15 +257,15 @@ static supine_status draw_scene(const supine_basis *basis, const supine_scene *s
 }
 
 /* Return the height of the table on which the patient of a panel lies, in the plane of
- * supine_render_extent, mm: below the lowest point of the lungs by the thickness of the chest's wall
- * where the torso is drawn. */
+ * supine_render_extent, mm: below the lowest point of the lungs by the thickness of the chest's
+ * wall where the torso is drawn. */
 static double ground_of(const supine_picture *picture, const double own[4]) {
   static const double wall = 28.0; /* mm */
   return picture->look == SUPINE_LOOK_SHELL ? own[2] - wall : own[2];
 }
 
-/* Return how far below the upper edge of a box {x, y, width, height} the height `ground`, mm, is drawn
- * with an extent, as a share of the box's height (supine_render_camera_aim). */
+/* Return how far below the upper edge of a box {x, y, width, height} the height `ground`, mm, is
+ * drawn with an extent, as a share of the box's height (supine_render_camera_aim). */
 static double share_above(const double extent[4], const double box[4], double ground) {
   const double wide = 1.03 * (extent[1] - extent[0]) / 2;
   const double high = 1.03 * (extent[3] - extent[2]) / 2;
@@ -281,8 +321,8 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
     table(by, box, box[3] * table_at);
   }
   if (panel->marks != NULL) {
-    const marks_style style = {by->theme->card, by->theme->ink, by->theme->faint,
-                               by->theme->target, by->at.font};
+    const marks_style style = {by->theme->card, by->theme->ink, by->theme->faint, by->theme->target,
+                               by->at.font};
     scene.width = (size_t)box[2];
     scene.height = (size_t)box[3];
     cairo.translate(by->cr, floor(box[0]), floor(box[1]));
@@ -350,8 +390,8 @@ static supine_status cell(const painter *by, size_t column, size_t row, const do
   }
   SUPINE_TRY(lungs(by, panel, view, box, extent, error));
   if (ball_shown) {
-    ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius,
-         view, panel->gravity);
+    ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
+         panel->gravity);
   }
   heading(by, panel, view, words, y + at->font * 0.3, room);
   return SUPINE_OK;
@@ -360,20 +400,26 @@ static supine_status cell(const painter *by, size_t column, size_t row, const do
 /* Write what the signs of a shell mean, and a remark, below the cells. */
 static void footer(const painter *by) {
   const supine_picture *picture = by->picture;
-  const double width = (double)picture->width;
-  const letters face = {fmax(10.0, 0.6 * by->at.font), false};
-  const double y =
-      (double)picture->height - by->at.caption_height - 0.45 * by->at.footer_height;
-  const double edge = by->at.font;
-  double used = 0.0;
+  const layout *at = &by->at;
+  const double right = (double)picture->width - at->margin;
+  double y = (double)picture->height - at->caption_height - at->footer_height + 0.9 * at->font;
   colour(by->cr, by->theme->faint);
-  if (picture->remark != NULL) {
-    used = supine_render_letters_width(by->cr, &face, picture->remark) + edge;
-    text(by->cr, &face, width - edge, y, 1.0, picture->remark);
-  }
   if (picture->legend != NULL) {
-    (void)fitted_text(by->cr, edge, y, &face, width - 2 * edge - used, picture->legend);
+    paragraph(by->cr, &at->small, at->margin, y, at->room, at->step, picture->legend);
+    y += at->beside ? 0.0
+                    : at->step * (double)count_lines(by->cr, &at->small, at->room, picture->legend);
   }
+  if (picture->remark != NULL) {
+    text(by->cr, &at->small, at->beside ? right : at->margin, y, at->beside ? 1.0 : 0.0,
+         picture->remark);
+  }
+}
+
+static void caption(const painter *by) {
+  const layout *at = &by->at;
+  const double y = (double)by->picture->height - at->caption_height + 0.3 * at->font + at->step;
+  colour(by->cr, by->theme->faint);
+  paragraph(by->cr, &at->small, at->margin, y, at->room, at->step, by->picture->caption);
 }
 
 static void colour_bar(const painter *by) {
@@ -418,53 +464,27 @@ static void colour_bar(const painter *by) {
   }
 }
 
-/* Size of the letters of a caption, and the distance of its lines, relative to the font. */
-static const double caption_size = 0.6;
-static const double caption_step = 0.75;
-
-/* Draw the caption. Break it into lines at blanks; reduce the letters of the last line if it needs
- * more lines than the layout has. */
-static void caption(const painter *by) {
-  const layout *at = &by->at;
-  const letters face = {at->font * caption_size, false};
-  const char *next = by->picture->caption;
-  const double room = (double)by->picture->width - 2 * at->margin;
-  double y = (double)by->picture->height - at->caption_height + 0.3 * at->font;
-  colour(by->cr, by->theme->faint);
-  for (size_t i = 0; i < at->caption_lines && *next != '\0'; ++i) {
-    char line[512];
-    size_t fits = 0;
-    for (size_t length = 1; length < sizeof line - 1 && next[length - 1] != '\0'; ++length) {
-      if (next[length] == ' ' || next[length] == '\0') {
-        (void)snprintf(line, sizeof line, "%.*s", (int)length, next);
-        if (fits > 0 && i + 1 < at->caption_lines &&
-            supine_render_letters_width(by->cr, &face, line) > room) {
-          break;
-        }
-        fits = length;
-      }
-    }
-    (void)snprintf(line, sizeof line, "%.*s", (int)fits, next);
-    y += at->font * caption_step;
-    (void)fitted_text(by->cr, at->margin, y, &face, room, line);
-    next += next[fits] == ' ' ? fits + 1 : fits;
+/* Plan the words below the cells, in letters of at least `least` pixels. */
+static void plan_words(cairo_t *cr, const supine_picture *picture, double least, layout *at) {
+  at->small = (letters){fmax(least, 0.6 * at->font), false};
+  at->step = 1.25 * at->small.size;
+  const size_t lines[2] = {count_lines(cr, &at->small, at->room, picture->legend),
+                           count_lines(cr, &at->small, at->room, picture->caption)};
+  double used = at->font;
+  used +=
+      picture->legend != NULL ? supine_render_letters_width(cr, &at->small, picture->legend) : 0;
+  used +=
+      picture->remark != NULL ? supine_render_letters_width(cr, &at->small, picture->remark) : 0;
+  at->beside = used <= at->room;
+  at->caption_height = lines[1] > 0 ? at->step * (double)lines[1] + 0.7 * at->font : 0.0;
+  at->footer_height = 4.6 * at->font; /* of a colour bar */
+  if (picture->look == SUPINE_LOOK_SHELL) {
+    const size_t more = at->beside ? 0 : lines[0];
+    at->footer_height = 0.85 * at->font + at->step * (double)(more + 1);
   }
 }
 
-/* Plan the lines of a caption from the usual width of letters. */
-static void plan_caption(const supine_picture *picture, layout *at) {
-  static const double letter = 0.52; /* width of a letter, relative to its size */
-  const double room = (double)picture->width - 2 * at->margin;
-  at->caption_lines = 0;
-  at->caption_height = 0;
-  if (picture->caption != NULL && picture->caption[0] != '\0') {
-    at->caption_lines =
-        1 + (size_t)((double)strlen(picture->caption) * letter * caption_size * at->font / room);
-    at->caption_height = at->font * (caption_step * (double)at->caption_lines + 0.7);
-  }
-}
-
-static layout make_layout(const supine_picture *picture) {
+static layout make_layout(cairo_t *cr, const supine_picture *picture) {
   layout at;
   const double width = (double)picture->width;
   const double height = (double)picture->height;
@@ -472,17 +492,19 @@ static layout make_layout(const supine_picture *picture) {
   const double rows = (double)picture->view_count;
   at.font = fmin(28, fmin(width / columns / 19, height / rows / 24));
   at.margin = at.font * 0.9;
-  plan_caption(picture, &at);
+  at.room = width - 2 * at.margin;
+  plan_words(cr, picture, 10.0, &at);
+  if (at.caption_height + at.footer_height > height / 3) {
+    plan_words(cr, picture, 0.0, &at);
+  }
   if (picture->look == SUPINE_LOOK_SHELL) {
     at.heading_height = at.font * 4.1;
-    at.footer_height = at.font * 1.6;
     at.cell_width = floor(width / columns);
     at.cell_height = (height - at.footer_height - at.caption_height) / rows;
     return at;
   }
   const double gap = at.margin / 2;
   at.heading_height = at.font * 5.2;
-  at.footer_height = at.font * 4.6;
   at.cell_width = (width - 2 * at.margin - gap * (columns - 1)) / columns;
   at.cell_height =
       (height - at.margin - at.footer_height - at.caption_height - gap * (rows - 1)) / rows;
@@ -498,8 +520,7 @@ void supine_render_picture_extent(const supine_basis *basis, const supine_pictur
           .pose = panel->pose, .view = picture->view[row], .gravity = panel->gravity};
       double own[4] = SUPINE_EXTENT_NONE;
       supine_render_extent(basis, &scene, own);
-      const double ground =
-          picture->view[row] == SUPINE_VIEW_LYING ? ground_of(picture, own) : 0.0;
+      const double ground = picture->view[row] == SUPINE_VIEW_LYING ? ground_of(picture, own) : 0.0;
       if (picture->look == SUPINE_LOOK_SHELL && picture->view[row] == SUPINE_VIEW_LYING) {
         own[2] = fmin(own[2], ground - 10.0); /* show the table, too */
       }
@@ -538,7 +559,7 @@ static supine_status compose(const painter *by, supine_error *error) {
   } else {
     footer(by);
   }
-  if (by->at.caption_lines > 0) {
+  if (by->at.caption_height > 0.0) {
     caption(by);
   }
   return SUPINE_OK;
@@ -570,7 +591,7 @@ static supine_status draw_on(cairo_surface_t *surface, double detail, const supi
                              const supine_picture *picture, supine_error *error) {
   SUPINE_FREED_BY(free_context) cairo_t *cr = cairo.create(surface);
   const painter by = {
-      cr, basis, picture, &themes[picture->look], detail, make_layout(picture),
+      cr, basis, picture, &themes[picture->look], detail, make_layout(cr, picture),
   };
   SUPINE_TRY(check(cairo.status(cr), "picture", error));
   SUPINE_TRY(compose(&by, error));

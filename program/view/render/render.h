@@ -53,6 +53,18 @@ void supine_render_colour(supine_colours map, double t, double rgb[3]);
 /** Write the colour of a map at t as the six hexadecimal digits of HTML. */
 void supine_render_hex(supine_colours map, double t, char text[7]);
 
+/** Colours that tell one thing from another of its kind. */
+typedef enum supine_palette {
+  SUPINE_PALETTE_TARGETS = 0, /**< teal; orange for the selected target */
+  SUPINE_PALETTE_ANATOMY,     /**< of large structures, such as airways and lobes */
+  SUPINE_PALETTE_POSTURES,    /**< of the outlines and lines of a report */
+  SUPINE_PALETTE_COUNT
+} supine_palette;
+
+/** Return colour `i` of a palette, sRGB, 0xRRGGBB; its colours repeat. Pictures, the report and the
+ * page take theirs from here. What a colour tells is told by a name or a shape, too. */
+uint32_t supine_render_palette(supine_palette palette, size_t i);
+
 /** How the lungs are drawn. */
 typedef enum supine_look {
   SUPINE_LOOK_MAP = 0, /**< opaque, in the colours of a value; what is inside is drawn over them */
@@ -67,10 +79,10 @@ typedef enum supine_mark_kind {
   SUPINE_MARK_SELECTED,   /**< the target that the captions are about: orange, with a ghost where it
                              was, an arrow, and a ring of its expected error */
   SUPINE_MARK_ANATOMY     /**< part of a large structure, such as airways or a lobe: a translucent
-                             shell with one of SUPINE_RENDER_TINTS colours, without ghost and arrow */
+                             shell with a colour of SUPINE_PALETTE_ANATOMY, without ghost and arrow */
 } supine_mark_kind;
 
-enum { SUPINE_RENDER_TINTS = 6 }; /**< number of colours of anatomy, which repeat */
+enum { SUPINE_RENDER_TINTS = 6 }; /**< number of colours of anatomy */
 
 /** A point, or a vertex of a mesh, inside the lungs. */
 typedef struct supine_mark {

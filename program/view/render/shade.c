@@ -11,13 +11,7 @@ static const float gamma_exponent = 2.2F;
 static const float pink[3] = {0.92F, 0.66F, 0.62F};        /* of the shell where it faces the eye */
 static const float nearly_white[3] = {1.0F, 0.95F, 0.93F}; /* of its rim */
 static const float white[3] = {1.0F, 1.0F, 1.0F};
-static const float orange[3] = {0.98F, 0.49F, 0.20F};
-static const float teal[3] = {0.40F, 0.74F, 0.76F};
 static const float slate[3] = {0.36F, 0.46F, 0.58F};
-/* Of anatomy, as on the page: blue, violet, green, ochre, pink, grey. */
-static const float tints[SUPINE_RENDER_TINTS][3] = {
-    {0.31F, 0.54F, 0.88F}, {0.65F, 0.44F, 0.88F}, {0.25F, 0.62F, 0.39F},
-    {0.69F, 0.54F, 0.12F}, {0.82F, 0.35F, 0.49F}, {0.48F, 0.53F, 0.59F}};
 
 static float smoothstep(float low, float high, float x) {
   const float t = fminf(1.0F, fmaxf(0.0F, (x - low) / (high - low)));
@@ -44,8 +38,20 @@ static float highlight(const fragment *at, const float key[3], float sharpness) 
   return powf(lambert(at->normal, half), sharpness);
 }
 
+static void split(uint32_t colour, float rgb[3]) {
+  for (int k = 0; k < 3; ++k) {
+    rgb[k] = (float)(colour >> (16 - 8 * k) & 255U) / 255.0F;
+  }
+}
+
 void supine_render_shades(const supine_scene *scene, shades *made) {
   made->largest = (float)scene->largest;
+  for (size_t i = 0; i < 2; ++i) {
+    split(supine_render_palette(SUPINE_PALETTE_TARGETS, i), made->target[i]);
+  }
+  for (size_t i = 0; i < SUPINE_RENDER_TINTS; ++i) {
+    split(supine_render_palette(SUPINE_PALETTE_ANATOMY, i), made->tint[i]);
+  }
   for (int i = 0; i <= SHADES; ++i) {
     const float share = (float)i / SHADES;
     double rgb[3];
@@ -87,8 +93,8 @@ static void shade_shell(const fragment *at, float rgba[4]) {
 }
 
 /* Draw anatomy as the lungs, but in a colour of its own. */
-static void shade_anatomy(const fragment *at, float rgba[4]) {
-  const float *tint = tints[at->tint % SUPINE_RENDER_TINTS];
+static void shade_anatomy(const shades *tables, const fragment *at, float rgba[4]) {
+  const float *tint = tables->tint[at->tint % SUPINE_RENDER_TINTS];
   const float f = 1.0F - fminf(1.0F, fmaxf(0.0F, dot(at->normal, at->eye)));
   rgba[3] = 0.22F + 0.58F * f * f;
   for (int k = 0; k < 3; ++k) {
@@ -134,16 +140,16 @@ void supine_render_shade(const shades *tables, material what, const fragment *at
     shade_ghost(at, rgba);
     break;
   case MATERIAL_TARGET:
-    shade_solid(at, teal, rgba);
+    shade_solid(at, tables->target[0], rgba);
     break;
   case MATERIAL_SELECTED:
-    shade_solid(at, orange, rgba);
+    shade_solid(at, tables->target[1], rgba);
     break;
   case MATERIAL_ANATOMY:
-    shade_anatomy(at, rgba);
+    shade_anatomy(tables, at, rgba);
     break;
   case MATERIAL_DOT:
-    shade_solid(at, tints[at->tint % SUPINE_RENDER_TINTS], rgba);
+    shade_solid(at, tables->tint[at->tint % SUPINE_RENDER_TINTS], rgba);
     break;
   case MATERIAL_BODY:
     shade_body(at, rgba);
