@@ -350,10 +350,6 @@ KNOWN = {
     ("command validate --state", "swapped"): "belongs",
     ("command locate OBSERVED", "person"): "belongs",
     ("Python locate()", "person"): "belongs",
-    ("page volume", "range"): "one road",
-    # A link is taken from the page's address: what is wrong in it is left out without a word.
-    **{("page link", kind): "one road" for kind in ("range", "finite", "cut", "repeated")},
-    **{("page link, volume", kind): "one road" for kind in ("range", "finite", "repeated")},
     ("command embed MESH", "range"): "one road",
     ("command compare --breath", "range"): "one road",
 }

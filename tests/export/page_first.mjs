@@ -251,7 +251,7 @@ for (const [width, height, colorScheme, chosen] of [
   const { page: sized, complaints: said } = await openLungs(
     html,
     { viewport: { width, height }, colorScheme },
-    `#posture=left&target=${chosen}`,
+    `#posture=left${chosen && `&target=${chosen}`}`,
   );
   const top = (id) =>
     sized

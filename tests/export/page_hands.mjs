@@ -105,7 +105,8 @@ async function checkButtons(page) {
   await page.waitForFunction(() => document.fullscreenElement === null);
 }
 
-/** Check that typed numbers are limited to their range, and that an empty field is not accepted. */
+/** Check that typed numbers are taken, and that wrong ones are told beside their field, with what is right; the field
+ * then shows the number of the picture. */
 async function checkTyped(page) {
   const type = async (id, text) => {
     await page.locator(id).fill(text);
@@ -116,11 +117,32 @@ async function checkTyped(page) {
   assert.equal(await state(page, 'depth'), 123);
   await type('#tilt-number', '-20');
   assert.equal(await page.locator('#posture-name').inputValue(), 'supine-20');
-  await type('#tilt-number', '400');
-  assert.equal((await state(page, 'standing')).tilt, 90);
   await type('#tilt-number', '0');
   await type('#rate-number', '15');
   assert.equal(await state(page, 'rate'), 15);
+  const { depthMax, tidalMin, tidalMax } = await page.evaluate(() => window.supine.state);
+  const limits = (...ends) => ends.map((x) => String(Number(x.toFixed(1)))).join(' to ');
+  for (const [id, text, wants, shown] of [
+    ['#tilt-number', '400', '\u221290 to 90', '0'],
+    ['#depth-number', '9000', limits(0, depthMax), '123'],
+    ['#tidal-number', '1', limits(tidalMin, tidalMax), '500'],
+    ['#rate-number', '', '4 to 40', '15'],
+    ['#range-begin', '1e9', /a number below \d+/, null],
+    ['#range-end', '-1', /a number above 0/, null],
+  ]) {
+    const before = await page.locator(id).inputValue();
+    await type(id, text);
+    const told = await page.locator(`${id}-trouble`).textContent();
+    const named = await page.locator(id).getAttribute('aria-label');
+    assert.ok(told.startsWith(`${named} ${text && `\u201c${text}\u201d `}is not taken: give `), told);
+    assert.ok(typeof wants === 'string' ? told.includes(` give ${wants}. `) : wants.test(told), told);
+    assert.equal(await page.locator(id).inputValue(), shown ?? before);
+    assert.ok(told.endsWith(` Taken instead: ${shown ?? before}.`), told);
+    assert.equal(await page.locator(id).getAttribute('aria-invalid'), 'true');
+    await type(id, shown ?? before);
+    assert.ok(await page.locator(`${id}-trouble`).isHidden(), `${id} stays wrong`);
+  }
+  await page.locator('#range-auto').click();
   await type('#tidal-number', '');
   await page.locator('#tidal-number').blur();
   await page.locator('#depth').fill('500');

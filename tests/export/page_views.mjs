@@ -95,10 +95,57 @@ async function checkPostures(page) {
   await page.waitForFunction(() => Math.abs(window.supine.state.gravity[0] - 0.6) < 1e-9);
   await page.locator('#posture-name').fill('prune');
   await page.keyboard.press('Enter');
-  assert.match(await page.locator('#posture-trouble').textContent(), /prune/);
+  assert.match(await page.locator('#posture-name-trouble').textContent(), /prune/);
   await page.locator('#posture-name').fill('supine');
   await page.keyboard.press('Enter');
   await page.locator('#posture-name').blur();
+}
+
+/** Check that each wrong value of the link is told, with the value that is taken instead, and that no other key
+ * suffers. */
+async function checkWrongLinks(page) {
+  const follow = (link) =>
+    page.evaluate(
+      (text) =>
+        new Promise((done) => {
+          addEventListener('hashchange', () => {
+            const note = document.getElementById('link-trouble');
+            done(note.hidden ? '' : note.textContent);
+          }, { once: true });
+          location.hash = text;
+        }),
+      link,
+    );
+  const right = 'posture=prone&depth=200&tidal=500&colour=displacement';
+  assert.equal(await follow(right), '');
+  for (const [key, text, taken] of [
+    ['posture', 'left%2b100', 'prone'],
+    ['depth', '9000', '200'],
+    ['tidal', '', '500'],
+    ['colour', 'red', 'displacement'],
+    ['reference', 'pron', 'supine'],
+    ['room', 'no', '1'],
+    ['show', 'ghost.goats', 'contours.ghost'],
+    ['lungs', '2:1', '1:1'],
+    ['cut', 'z:1.5', 'none'],
+    ['range', '5:nan', 'automatic'],
+    ['camera', '0:9:1:0:0', '0:0.05:1:0:0'],
+    ['probes', '3.1e9', 'none'],
+    ['target', '0', 'first'],
+    ['since', '2', '0'],
+    ['slices', '1:2', 'middle'],
+    ['inside', '1', '0'],
+    ['inside', '0&inside=0', '0'],
+    ['prone', '', 'nothing'],
+  ]) {
+    const told = await follow(`${right.replace(new RegExp(`${key}=\\w*&?`), '')}&${key}=${text}`);
+    const given = decodeURIComponent(text).replace('&inside=', ' ');
+    const named = `Link: ${key} ${given && `\u201c${given}\u201d `}`;
+    assert.ok(told.startsWith(`${named}is not taken: give `), `${key}: ${told}`);
+    assert.ok(told.endsWith(` Taken instead: ${taken}.`), told);
+    assert.equal(told.split('Link: ').length, 2, told);
+  }
+  assert.equal(await follow('posture=supine&depth=500&show=contours&room=0&colour=displacement'), '');
 }
 
 /** Check that each display option changes the picture and can be undone. */
@@ -212,6 +259,7 @@ async function checkProbes(page) {
       document.getElementById('depth-value').textContent,
     ]);
   assert.deepEqual(await facts(again), await facts(page));
+  assert.ok(await again.locator('#link-trouble').isHidden());
   await close(again);
   await page.locator('#probes-clear').click();
 }
@@ -264,6 +312,7 @@ await checkViews(page);
 await checkCamera(page);
 await checkPostures(page);
 await checkShown(page);
+await checkWrongLinks(page);
 await checkSides(page);
 await checkProbes(page);
 await checkFrames(page);

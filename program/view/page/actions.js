@@ -53,16 +53,10 @@ const reset = () => {
 /** Bind the text field of the posture. */
 function bindPosture() {
   $('posture-name').addEventListener('change', () => {
-    const found = postureFrom($('posture-name').value);
-    $('posture-trouble').hidden = Boolean(found);
-    if (!found) {
-      write(
-        'posture-trouble',
-        `No posture \u201c${$('posture-name').value}\u201d. Type supine, prone, left, right, upright, inverted, ` +
-          'a tilt such as supine+15, a roll such as supine@30, or gravity such as 0.6:0:-0.8.',
-      );
-      return;
-    }
+    const field = $('posture-name');
+    const found = postureFrom(field.value);
+    complain(field, found ? '' : notTaken('Posture', field.value, POSTURE_WANTED, postureText(gravityOf(state.goal))));
+    if (!found) return;
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
@@ -72,27 +66,13 @@ function bindPosture() {
   }); // replaces a typed text that may be invalid
 }
 
-/** Bind the sliders. */
 function bindSliders() {
-  const slide = (id, act) =>
-    onSlider(id, (value) => {
-      act(value);
+  for (const id of Object.keys(SLIDERS)) {
+    bindSlider(id, () => {
+      remeasure();
       touch();
     });
-  slide('tilt', (value) => state.settle(state.standing.q, value, 0));
-  slide('depth', (value) => {
-    state.playing = false;
-    state.depth = value;
-    remeasure();
-  });
-  slide('tidal', (value) => {
-    state.tidal = value;
-    if (!state.playing) state.depth = state.expired + value;
-    remeasure();
-  });
-  slide('rate', (value) => {
-    state.rate = value;
-  });
+  }
 }
 
 /** Bind the keys of the picture. */
@@ -120,6 +100,19 @@ function bindKeys() {
   });
 }
 
+/** Bind the field of an end of the range of the colours. */
+function bindRange(end, accept, wants) {
+  const field = $(`range-${end}`);
+  field.addEventListener('change', () => {
+    const { begin, end: last } = state.range;
+    const typed = typedIn(field, accept, wants(), Number(state.range[end].toPrecision(4)));
+    if (typed === null) return;
+    change(() => {
+      state.ownRanges[state.kind] = { begin, end: last, [end]: typed };
+    })();
+  });
+}
+
 /** Bind buttons, checkboxes and fields. */
 function bindButtons() {
   $('play').addEventListener('click', play);
@@ -142,15 +135,8 @@ function bindButtons() {
       state.cut.at = $('cut').valueAsNumber;
     }),
   );
-  for (const id of ['range-begin', 'range-end']) {
-    $(id).addEventListener(
-      'change',
-      change(() => {
-        const [begin, end] = [$('range-begin').valueAsNumber, $('range-end').valueAsNumber];
-        if (end > begin) state.ownRanges[state.kind] = { begin, end };
-      }),
-    );
-  }
+  bindRange('begin', (x) => x < state.range.end, () => `a number below ${plain(state.range.end)}`);
+  bindRange('end', (x) => x > state.range.begin, () => `a number above ${plain(state.range.begin)}`);
   $('range-auto').addEventListener(
     'click',
     change(() => {

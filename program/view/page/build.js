@@ -103,6 +103,13 @@ function bindSaving() {
   });
 }
 
+/** Set the view from an address, and say what is wrong with it. */
+function followLink({ hash }) {
+  const wrong = takeLink(hash, state);
+  $('link-trouble').hidden = !wrong;
+  write('link-trouble', wrong);
+}
+
 /** Bind copying the link, and a changed address. */
 function bindLink() {
   $('link').addEventListener('click', async () => {
@@ -115,8 +122,8 @@ function bindLink() {
     }
     setTimeout(() => write('link', 'Copy link'), 2000);
   });
-  window.addEventListener('hashchange', () => {
-    takeLink(location.hash, state);
+  window.addEventListener('hashchange', ({ newURL }) => {
+    followLink(new URL(newURL)); // keepLink may have replaced the address already
     table?.press();
     told = null;
     remeasure();
@@ -163,15 +170,9 @@ function bindCanvas() {
 
 /** Set the ranges of the sliders. */
 function limitSliders() {
-  for (const [id, most] of [
-    ['depth', state.depthMax],
-    ['tidal', state.tidalMax],
-  ])
-    for (const end of [id, `${id}-number`]) $(end).max = most;
-  for (const end of ['depth', 'depth-number']) $(end).min = state.depthMin;
-  for (const end of ['tidal', 'tidal-number']) $(end).min = $(end).step = state.tidal / 50;
-  for (const end of ['depth', 'depth-number']) $(end).step = state.tidal / 100;
-  for (const end of ['tidal-number', 'depth-number']) $(end).step = 'any';
+  for (const id of Object.keys(SLIDERS)) [$(id).min, $(id).max] = state.limits[id];
+  $('tidal').step = state.tidal / 50;
+  $('depth').step = state.tidal / 100;
 }
 
 /** Return what the lungs' reference is, in words. */

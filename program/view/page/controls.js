@@ -54,35 +54,91 @@ function write(id, text) {
   element.textContent = text;
 }
 
-/** Set a slider, the number beside it and its accessible text. */
-function setSlider(id, value, text, digits = 0) {
-  const slider = $(id);
+/** Show what is wrong with the input of a field, beside it, until something else is typed; an empty text removes it. */
+function complain(field, text) {
+  const id = `${field.id}-trouble`;
+  if (!$(id)) {
+    if (!text) return;
+    const note = Object.assign(document.createElement('p'), { id, className: 'trouble', role: 'alert' });
+    field.closest('.slider, .row, .card').append(note);
+    field.setAttribute('aria-describedby', id);
+    field.addEventListener('input', () => complain(field, ''));
+  }
+  $(id).hidden = !text;
+  field.setAttribute('aria-invalid', String(Boolean(text)));
+  write(id, text);
+}
+
+/** Return the number typed in a field if `accept` returns true for it. Otherwise say that it is wrong, with `wants` and
+ * the number `shown` instead, and return null. The field then has the number that is shown. */
+function typedIn(field, accept, wants, shown) {
+  const right = accept(field.valueAsNumber);
+  complain(field, right ? '' : notTaken(field.ariaLabel, field.value, wants, shown));
+  if (right) return field.valueAsNumber;
+  field.value = shown;
+  return null;
+}
+
+/** Sliders, with a number beside each. */
+const SLIDERS = {
+  tilt: {
+    get: (s) => s.standing.tilt,
+    set: (s, value) => s.settle(s.standing.q, value, 0),
+    words: (value) => `${round(value, 1)} degrees`,
+  },
+  depth: {
+    get: (s) => s.depth,
+    set: (s, value) => Object.assign(s, { playing: false, depth: value }),
+    words: (value) => amount(value),
+  },
+  tidal: {
+    get: (s) => s.tidal,
+    set: (s, value) => Object.assign(s, { tidal: value, depth: s.playing ? s.depth : s.expired + value }),
+    words: (value) => amount(value),
+  },
+  rate: {
+    get: (s) => s.rate,
+    set: (s, value) => Object.assign(s, { rate: value }),
+    words: (value) => `${round(value, 1)} per minute`,
+  },
+};
+
+/** Show the value of a slider, in the number beside it and as accessible text too. */
+function setSlider(id) {
+  const { get, words } = SLIDERS[id];
+  const [value, slider, number] = [get(state), $(id), $(`${id}-number`)];
+  const text = words(value);
   if (slider.written === text) return;
-  const number = $(`${id}-number`);
-  if (document.activeElement !== number) number.value = value.toFixed(digits);
+  if (document.activeElement !== number) number.value = parseFloat(text);
   slider.written = text;
   slider.value = value;
   slider.setAttribute('aria-valuetext', text);
   fill(slider);
 }
 
-/** Call act(value) when a slider or the number beside it changes; the value is clamped to its range. */
-function onSlider(id, act) {
-  const take = (input) => {
-    const value = input.valueAsNumber;
-    const slider = $(id);
-    if (Number.isFinite(value)) act(Math.max(Number(slider.min), Math.min(Number(slider.max), value)));
+/** Follow a slider and the number beside it; call `then` after a change. */
+function bindSlider(id, then) {
+  const [slider, number] = [$(id), $(`${id}-number`)];
+  const take = (value) => {
+    SLIDERS[id].set(state, value);
+    slider.written = ''; // makes setSlider replace a number that was typed otherwise
+    then();
   };
-  $(id).addEventListener('input', () => take($(id)));
-  for (const [type, then] of [
-    ['change', take],
-    ['blur', () => {}],
-  ]) {
-    $(`${id}-number`).addEventListener(type, () => {
-      $(id).written = ''; // makes setSlider replace a typed text that is not a number or is out of range
-      then($(`${id}-number`));
-    });
-  }
+  slider.addEventListener('input', () => {
+    complain(number, '');
+    take(slider.valueAsNumber);
+  });
+  number.addEventListener('change', () => {
+    const limits = state.limits[id];
+    const accept = (x) => Number.isFinite(limitedTo(limits, x));
+    const shown = parseFloat(SLIDERS[id].words(SLIDERS[id].get(state)));
+    const typed = typedIn(number, accept, rangeWords(limits), shown);
+    if (typed !== null) take(limitedTo(limits, typed));
+  });
+  number.addEventListener('blur', () => {
+    slider.written = '';
+    redraw();
+  });
 }
 
 function makePostureButtons(choose) {

@@ -107,8 +107,9 @@ function bindHeadset() {
 }
 
 function keepLink() {
+  const link = linkOf(state);
   try {
-    history.replaceState(null, '', `#${linkOf(state)}`);
+    history.replaceState(null, '', `#${link}`);
   } catch {
     // Some browsers refuse to change the URL of a page that was opened from a file.
   }

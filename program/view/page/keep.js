@@ -6,84 +6,216 @@ const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 
-/** Return the view as the fragment of a URL; empty values are omitted. */
+const numbersIn = (text, separator = ':') => text.split(separator).map((x) => (x.trim() === '' ? NaN : Number(x)));
+const isWithin = (x, [low, high]) => x >= low && x <= high;
+const rangeWords = (limits) => limits.map((x) => round(x, 1).replace('-', '\u2212')).join(' to ');
+
+/** Return a number within its limits, which are shown with one decimal; NaN for others. */
+const limitedTo = ([low, high], x) =>
+  isWithin(x, [low - 0.05, high + 0.05]) ? Math.max(low, Math.min(high, x)) : NaN;
+
+
+/** Return the key of the link for a number that has limits. */
+const limited = (name) => ({
+  wants: (state) => rangeWords(state.limits[name]),
+  write: (state) => round(state[name], 1),
+  read(state, text) {
+    const x = limitedTo(state.limits[name], Number(text || NaN));
+    if (Number.isFinite(x)) state[name] = x;
+    return Number.isFinite(x);
+  },
+});
+
+/** Return the key of the link for one of the words of `list`. `get` returns the index of the one shown, and `set` takes
+ * it. */
+const worded = (list, get, set, usual) => ({
+  wants: (state) => list(state).join(' or '),
+  write: (state) => list(state)[get(state)],
+  read(state, text) {
+    const index = list(state).indexOf(text);
+    if (index >= 0) set(state, index);
+    return index >= 0;
+  },
+  usual: usual && ((state) => list(state)[usual(state)]),
+});
+
+/** Return the key of the link for a posture. */
+const posed = (get, set) => ({
+  wants: () => POSTURE_WANTED,
+  write: (state) => postureText(gravityOf(get(state))),
+  read(state, text) {
+    const found = postureFrom(text);
+    if (found) set(state, found);
+    return Boolean(found);
+  },
+});
+
+/** Keys of the link. `write` returns the text for the view that is shown, and `read` takes a text, or returns false if
+ * it is wrong; `wants` says what is right. The text `usual` is left out of the link; it is what a link without the key
+ * means. Without `usual`, such a link changes nothing. A key may depend on those before it. */
+const LINK = {
+  posture: posed(
+    (state) => state.goal,
+    (state, { q, tilt }) => state.settle(q, tilt, 0),
+  ),
+  depth: limited('depth'),
+  tidal: limited('tidal'),
+  colour: worded(
+    ({ basis }) => Object.keys(KINDS).filter((kind) => kind !== 'expansion' || basis.words !== 0),
+    ({ kind }) => Object.keys(KINDS).indexOf(kind),
+    (state, i) => {
+      state.kind = Object.keys(KINDS)[i];
+    },
+  ),
+  reference: posed(
+    (state) => state.pinnedQ,
+    (state, { q, tilt }) => {
+      state.pinnedQ = tilted(q, tilt);
+    },
+  ),
+  room: worded(
+    () => ['0', '1'],
+    ({ room }) => Number(room),
+    (state, i) => Object.assign(state, { room: i === 1, roomBlend: i }),
+    () => 1,
+  ),
+  show: {
+    wants: () => `nothing, or some of ${SHOWN.join('.')}`,
+    write: (state) => SHOWN.filter((name) => state[name]).join('.') || 'nothing',
+    read(state, text) {
+      const shown = text === 'nothing' ? [] : text.split('.');
+      if (!shown.every((name) => SHOWN.includes(name))) return false;
+      for (const name of SHOWN) state[name] = shown.includes(name);
+      return true;
+    },
+    usual: ({ basis }) => (basis.inside ? 'contours' : 'contours.ghost'),
+  },
+  lungs: {
+    wants: ({ opacity }) => `an opacity of 0 to 1 for each lung, such as ${opacity.map(() => FADED).join(':')}`,
+    write: ({ opacity }) => opacity.join(':'),
+    read(state, text) {
+      const opacity = numbersIn(text);
+      if (opacity.length !== state.opacity.length || !opacity.every((x) => isWithin(x, [0, 1]))) return false;
+      state.opacity = opacity;
+      return true;
+    },
+    usual: (state) => state.opacity.map(() => state.usualOpacity()).join(':'),
+  },
+  cut: {
+    wants: () => 'none, or x, y or z and a position of 0 to 1, such as z:0.5',
+    write: ({ cut }) => (cut.axis < 0 ? 'none' : `${'xyz'[cut.axis]}:${round(cut.at)}`),
+    read(state, text) {
+      const [, axis, at] = /^([xyz]):([^:]+)$/.exec(text) ?? [];
+      if (text !== 'none' && !isWithin(Number(at), [0, 1])) return false;
+      state.cut = axis ? { axis: 'xyz'.indexOf(axis), at: Number(at) } : { axis: -1, at: 0.5 };
+      return true;
+    },
+    usual: () => 'none',
+  },
+  range: {
+    wants: () => 'automatic, or two numbers of which the second is larger, such as 0:20',
+    write: ({ ownRanges, kind }) => (ownRanges[kind] ? `${ownRanges[kind].begin}:${ownRanges[kind].end}` : 'automatic'),
+    read(state, text) {
+      const [begin, end, ...more] = numbersIn(text);
+      if (text !== 'automatic' && (more.length || !(end > begin && Number.isFinite(end - begin)))) return false;
+      state.ownRanges[state.kind] = text === 'automatic' ? undefined : { begin, end };
+      return true;
+    },
+    usual: () => 'automatic',
+  },
+  camera: {
+    wants: () =>
+      'azimuth, elevation (\u22121.58 to 1.58), zoom (0.3 to 30), shifts x and y, and maybe a pivot x, y, z',
+    write: ({ camera: { azimuth, elevation, zoom, pan, pivot } }) =>
+      [azimuth, elevation, zoom, ...pan, ...(pivot ?? [])].map((x) => round(x)).join(':'),
+    read(state, text) {
+      const [azimuth, elevation, zoom, ...places] = numbersIn(text);
+      const right = [azimuth, ...places].every(Number.isFinite) && [2, 5].includes(places.length);
+      if (!right || !isWithin(elevation, [-1.58, 1.58]) || !isWithin(zoom, [0.3, 30])) return false;
+      const pivot = places.length === 5 ? places.slice(2) : null;
+      state.camera = { azimuth, elevation, zoom, pan: places.slice(0, 2), pivot };
+      return true;
+    },
+  },
+  probes: {
+    wants: ({ basis }) => `none, or at most ${PROBES_MOST} vertices of 0 to ${basis.vertices - 1}, such as 3.250`,
+    write: ({ probes }) => probes.join('.') || 'none',
+    read(state, text) {
+      const probes = text === 'none' ? [] : numbersIn(text, '.');
+      const right = probes.every((v) => Number.isInteger(v) && isWithin(v, [0, state.basis.vertices - 1]));
+      if (right && probes.length <= PROBES_MOST) state.probes = probes;
+      return right && probes.length <= PROBES_MOST;
+    },
+    usual: () => 'none',
+  },
+  target: {
+    wants: ({ basis }) => `first, or a number of 0 to ${(basis.inside?.names.length ?? 1) - 1}`,
+    write: ({ picked, chosen }) => (picked ? String(chosen) : 'first'),
+    read(state, text) {
+      const picked = text !== 'first';
+      if (picked && !state.basis.inside?.names[text]) return false;
+      Object.assign(state, { picked, chosen: picked ? Number(text) : state.chosen });
+      return true;
+    },
+    usual: () => 'first',
+  },
+  since: worded(
+    ({ basis }) => basis.froms.map((_, i) => String(i)),
+    ({ basis, from }) => basis.froms.indexOf(from),
+    (state, i) => {
+      state.from = state.basis.froms[i];
+    },
+    () => 0,
+  ),
+  slices: {
+    wants: () => 'middle, or x, y and z within the lungs, mm, such as 60:-120:-110',
+    write: ({ slices }) => slices?.map((x) => round(x, 1)).join(':') ?? 'middle',
+    read(state, text) {
+      const slices = text === 'middle' ? null : numbersIn(text);
+      if (slices) state.measure(); // the body at the volume that the link has set
+      const { low, high } = state.body;
+      const right = slices === null || (slices.length === 3 && slices.every((x, i) => isWithin(x, [low[i], high[i]])));
+      if (right) state.slices = slices;
+      return right;
+    },
+    usual: () => 'middle',
+  },
+  inside: worded(
+    ({ basis }) => (basis.inside ? ['0', '1'] : ['0']),
+    ({ inside }) => Number(inside),
+    (state, i) => {
+      state.inside = i === 1;
+    },
+    ({ basis }) => Number(Boolean(basis.inside)),
+  ),
+};
+
+/** Return the view as the fragment of a URL. */
 function linkOf(state) {
-  const { camera } = state;
-  const all = {
-    posture: postureText(gravityOf(state.goal)),
-    depth: round(state.depth, 1),
-    tidal: round(state.tidal, 1),
-    colour: state.kind,
-    reference: postureText(gravityOf(state.pinnedQ)),
-    room: state.room ? '' : '0',
-    show: SHOWN.filter((name) => state[name]).join('.') || 'nothing',
-    lungs: state.opacity.every((x) => x === state.usualOpacity()) ? '' : state.opacity.join(':'),
-    cut: state.cut.axis < 0 ? '' : `${'xyz'[state.cut.axis]}:${round(state.cut.at)}`,
-    range: state.ownRanges[state.kind] ? `${state.ownRanges[state.kind].begin}:${state.ownRanges[state.kind].end}` : '',
-    camera: [camera.azimuth, camera.elevation, camera.zoom, ...camera.pan, ...(camera.pivot ?? [])]
-      .map((x) => round(x))
-      .join(':'),
-    slices: state.slices ? state.slices.map((x) => round(x, 1)).join(':') : '',
-    probes: state.probes.join('.'),
-    target: state.picked ? String(state.chosen) : '',
-    since: state.basis.froms.length > 1 ? String(state.basis.froms.indexOf(state.from)) : '',
-    inside: state.basis.inside && !state.inside ? '0' : '',
-  };
-  return new URLSearchParams(Object.entries(all).filter(([, value]) => value !== ''))
+  const written = Object.entries(LINK).filter(([, { write, usual }]) => write(state) !== usual?.(state));
+  return new URLSearchParams(written.map(([key, { write }]) => [key, write(state)]))
     .toString()
     .replaceAll('%3A', ':')
     .replaceAll('%2B', '%2b');
 }
 
-/** Set the view from the fragment of a URL; ignore invalid values. */
+/** Return what is wrong with an input in words: its name, what was given, what is right, and what is shown instead. */
+const notTaken = (name, given, wants, shown) =>
+  `${name} ${given && `\u201c${shortName(given, 60)}\u201d `}is not taken: give ${wants}. Taken instead: ${shown}.`;
+
+/** Set the view from the fragment of a URL. Return what is wrong with it in words, which is empty if all is right. */
 function takeLink(text, state) {
-  const link = new URLSearchParams(text.replace(/^#/, ''));
-  const numbers = (name, separator = ':') =>
-    (link.get(name) ?? '')
-      .split(separator)
-      .filter((x) => x !== '')
-      .map(Number);
-  const within = (value, low, high, otherwise) =>
-    Number.isFinite(value) && value >= low && value <= high ? value : otherwise;
-  const posture = postureFrom(link.get('posture') ?? '');
-  if (posture) state.settle(posture.q, posture.tilt, 0);
-  const reference = postureFrom(link.get('reference') ?? '');
-  if (reference) state.pinnedQ = tilted(reference.q, reference.tilt);
-  state.tidal = within(numbers('tidal')[0], 1e-3, state.tidalMax, state.tidal);
-  state.depth = within(numbers('depth')[0], state.depthMin, state.depthMax, state.depth);
-  if (KINDS[link.get('colour')]) state.kind = link.get('colour');
-  state.room = link.get('room') !== '0';
-  state.roomBlend = state.room ? 1 : 0;
-  const shown = (link.get('show') ?? (state.basis.inside ? 'contours' : 'contours.ghost')).split('.');
-  for (const name of SHOWN) state[name] = shown.includes(name);
-  state.opacity = state.opacity.map(() => state.usualOpacity());
-  const opacity = numbers('lungs');
-  if (opacity.length === state.opacity.length && opacity.every((x) => x >= 0 && x <= 1)) state.opacity = opacity;
-  const [axis, at] = (link.get('cut') ?? '').split(':');
-  state.cut = { axis: axis ? 'xyz'.indexOf(axis) : -1, at: within(Number(at), 0, 1, 0.5) };
-  const [begin, end] = numbers('range');
-  if (end > begin) state.ownRanges[state.kind] = { begin, end };
-  const camera = numbers('camera');
-  if (camera.length >= 5 && camera.every(Number.isFinite)) {
-    state.camera = {
-      azimuth: camera[0],
-      elevation: within(camera[1], -1.58, 1.58, 0),
-      zoom: within(camera[2], 0.3, 30, 1),
-      pan: camera.slice(3, 5),
-      pivot: camera.length === 8 ? camera.slice(5) : null,
-    };
+  const link = new URLSearchParams(text.replace(/^#/, '').replaceAll('+', '%2b'));
+  const wrong = [];
+  for (const [key, { wants, write, read, usual }] of Object.entries(LINK)) {
+    const given = link.getAll(key);
+    if (usual) read(state, usual(state));
+    if (given.length > 1 || (given.length === 1 && !read(state, given[0])))
+      wrong.push(notTaken(`Link: ${key}`, given.join(' '), wants(state), write(state)));
   }
-  const slices = numbers('slices');
-  if (slices.length === 3 && slices.every((x, axis) => x > state.body.low[axis] && x < state.body.high[axis]))
-    state.slices = slices;
-  state.inside = Boolean(state.basis.inside) && link.get('inside') !== '0';
-  const target = numbers('target')[0];
-  state.picked = Number.isInteger(target) && within(target, 0, (state.basis.inside?.names.length ?? 1) - 1, -1) >= 0;
-  if (state.picked) state.chosen = target;
-  state.from = state.basis.froms[numbers('since')[0] ?? 0] ?? state.basis.froms[0];
-  state.probes = numbers('probes', '.')
-    .filter((v) => Number.isInteger(v) && v >= 0 && v < state.basis.vertices)
-    .slice(0, 8);
+  for (const key of new Set(link.keys()))
+    if (!LINK[key]) wrong.push(notTaken(`Link: ${key}`, '', `only ${Object.keys(LINK).join(', ')}`, 'nothing'));
+  return wrong.join('\n');
 }
 
 /** Return the picture with the notes, title, `lines` of text and, unless `range` is null, the colour bar as a PNG blob.

@@ -31,11 +31,8 @@ function showState() {
       .replaceAll('-', '\u2212')
       .replaceAll('\u22120.00', '0.00'),
   );
-  setSlider('tilt', state.standing.tilt, `${state.standing.tilt} degrees`);
-  setSlider('depth', state.depth, amount(state.depth), 0);
+  for (const id of Object.keys(SLIDERS)) setSlider(id);
   write('depth-value', volumeWords());
-  setSlider('tidal', state.tidal, amount(state.tidal), 0);
-  setSlider('rate', state.rate, `${state.rate} per minute`);
   changed('playing', state.playing, () => {
     $('play').setAttribute('aria-pressed', String(state.playing));
     $('play').setAttribute('aria-label', state.playing ? 'Pause the breath' : 'Play the breath');

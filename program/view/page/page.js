@@ -37,7 +37,7 @@ async function prepare() {
   basis = await readBasis();
   ({ inside } = basis);
   state = new State(basis);
-  takeLink(location.hash, state);
+  followLink(location);
   state.measure(); // the URL may have set a larger volume, which changes the ranges of the colour bar
   canvas = $('picture');
   picture = pictureOn(canvas, basis);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Mark vertices (probes): list them with their values, and measure the distance between the last two.
 
+const PROBES_MOST = 8;
+
 /** Return the value that the colour at a marked vertex shows; null if it has none. */
 function probeValue(vertex) {
   if (state.kind === 'expansion') return null;
@@ -54,7 +56,7 @@ function showProbes() {
 
 function addProbe(found) {
   if (found?.part !== undefined) choose(found.part);
-  if (!found || found.part !== undefined || state.probes.length === 8) return;
+  if (!found || found.part !== undefined || state.probes.length === PROBES_MOST) return;
   const moment = found.pane === 'pinned' ? state.pinned : state.moment;
   state.probes.push(nearestVertex(basis, picture.read(moment)[0], found.at));
   redraw();

@@ -46,6 +46,11 @@ function postureText(gravity) {
 /** Return a direction of gravity as text: like postureText, but "left side" instead of "left". */
 const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
 
+/** What a text of a posture may be, in words. */
+const POSTURE_WANTED =
+  'supine, prone, left, right, upright, inverted, a tilt such as supine+15, a roll such as supine@30, ' +
+  'or gravity such as 0.6:0:-0.8';
+
 /** Return a posture from a text in the notation of --posture, or null if the text is not valid. {q, tilt} are the
  * quaternion of the posture without its tilt, and the tilt, degrees. */
 function postureFrom(text) {
@@ -122,6 +127,7 @@ class State {
   takeVolumes() {
     const { basis } = this;
     this.tidal = basis.breathVolume;
+    this.tidalMin = this.tidal / 50;
     this.depthMin = 0;
     const held = basis.breathes ? (momentFor(basis, gravityOf(POSTURES[0].q), 0).held ?? basis.references) : [];
     // Full inflation, if it was scanned
@@ -137,6 +143,16 @@ class State {
       this.tidal = Math.min(this.tidal, this.tidalMax);
     }
     this.depth = this.expired;
+  }
+
+  /** Least and largest value of each number that can be typed: degrees, mL, and breaths per minute. */
+  get limits() {
+    return {
+      tilt: [-90, 90],
+      depth: [this.depthMin, this.depthMax],
+      tidal: [this.tidalMin, this.tidalMax],
+      rate: [4, 40],
+    };
   }
 
   /** Volume at the end of an expiration: 0 if a breath from there stays within reach. */
