@@ -51,7 +51,9 @@ enum { SUPINE_FIT_SUSPECTS_MAX = 3 };
 /** A run that the others predict badly (suspects.h). */
 typedef struct supine_fit_suspect {
   size_t run;
-  double ratio; /**< RMS error / median error of the other runs, each predicted from the others */
+  double ratio; /**< RMS error / upper quartile of the errors of the other runs, each predicted from
+                     the others and divided by the norm of its weights (suspects.c); for `zero`, /
+                     their median, undivided */
   double part;  /**< RMS error / RMS displacement of all runs */
 } supine_fit_suspect;
 

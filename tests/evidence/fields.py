@@ -9,11 +9,12 @@ the simulator: the displacements from full inflation to rest, and from supine to
 plans of directions. Each plan is fitted as `precompute --fields` fits it. Then caps of the sphere are left empty, and
 the error that is found in 150 other directions is divided by the leave-one-out error that would be stated.
 
-Last, or alone with --sets, the errors that bases of right sets state are compared with those found in directions
-that are left out, for all vertices and for each; and right sets and the same sets made wrong are measured as the
-checks of runs, points, units and axes measure them: the law of each map (at rest from two origins, and at five
-volumes), formulas on its surface (nonlinear in gravity and volume, one of them with a lung that opens late), and
-CalculiX where it is installed (tests/evidence/fem.py)."""
+Last, or alone with --sets, bases are made of right sets without a fifth of their directions. The errors that they
+state are compared with those found in states drawn between the runs, and in the directions that are left out, which lie
+in the middle of the holes of the plan, for all vertices and for each. Then right sets and the same sets made wrong are
+measured as the checks of runs, points, units and axes measure them: the law of each map (at rest from two origins, and
+at five volumes), formulas on its surface (nonlinear in gravity and volume, one of them with a lung that opens late),
+and CalculiX where it is installed (tests/evidence/fem.py). The limits of these checks were chosen on these sets."""
 import itertools
 import os
 import pathlib
@@ -28,6 +29,7 @@ from evidence import take_package
 
 POINTS = 300  # vertices that are compared
 FINE = 5000  # directions in which the gap is looked for
+DRAWN = 60  # states between the runs
 
 
 def even(count):
@@ -122,11 +124,13 @@ def caps(basis, step):
 
 
 class Set:
-    """Fields of a simulator: plan [M, 4] has a direction and a filling in each row, u [M, N, 3] the displacements."""
+    """Fields of a simulator: plan [M, 4] has a direction and a filling in each row, u [M, N, 3] the displacements,
+    which law(row) computes for any row."""
 
-    def __init__(self, name, points, faces, plan, u):
-        self.name, self.points, self.faces = name, points, faces
-        self.plan, self.u = np.asarray(plan, float), np.asarray(u, float)
+    def __init__(self, name, points, faces, plan, law, u=None):
+        self.name, self.points, self.faces, self.law = name, points, faces, law
+        self.plan = np.asarray(plan, float)
+        self.u = np.asarray([law(row) for row in self.plan] if u is None else u, float)
 
 
 def grid(directions, volumes):
@@ -154,7 +158,7 @@ def formula_sets(points, faces):
 
     plans = [("sags, 24", sag, grid(24, 1)), ("sags, 32 x 4", sag, grid(32, 4)),
              ("compresses, 24 x 4", compress, grid(24, 4)), ("opens late, 24 x 6", late, grid(24, 6))]
-    return [Set(name, points, faces, plan, [law(row[:3], row[3]) for row in plan]) for name, law, plan in plans]
+    return [Set(name, points, faces, plan, lambda row, law=law: law(row[:3], row[3])) for name, law, plan in plans]
 
 
 def law_sets(package, path):
@@ -162,12 +166,11 @@ def law_sets(package, path):
     basis = package.precompute(path, edge=12, held_out=20)
     at = lambda g, volume: basis.deform(basis.pose(tuple(g), volume)).astype(float)
     faces, supine = np.array(basis.triangles), at((0, 1, 0), "scan")
-    full, plan = basis.vertices.astype(float), grid(24, 5)
-    rest, name = np.array([at(g, "rest") for g in even(24)]), pathlib.Path(path).name.split(".")[0]
-    return [Set(f"{name}, rest", supine, faces, grid(24, 1), rest - supine),
-            Set(f"{name}, from full", full, faces, grid(24, 1), rest - full),
-            Set(f"{name}, 24 x 5", supine, faces, plan,
-                [at(row[:3], f"rest+{1500 * row[3]:.0f}") - supine for row in plan])]
+    full, name = basis.vertices.astype(float), pathlib.Path(path).name.split(".")[0]
+    return [Set(f"{name}, rest", supine, faces, grid(24, 1), lambda row: at(row[:3], "rest") - supine),
+            Set(f"{name}, from full", full, faces, grid(24, 1), lambda row: at(row[:3], "rest") - full),
+            Set(f"{name}, 24 x 5", supine, faces, grid(24, 5),
+                lambda row: at(row[:3], f"rest+{1500 * row[3]:.0f}") - supine)]
 
 
 def calculix_sets(build, vertices=800):
@@ -176,8 +179,8 @@ def calculix_sets(build, vertices=800):
     points, faces = fem.surface(str(build / "supine"), vertices)
     for law, plan in (("linear", grid(32, 1)), ("neo-Hookean", grid(32, 1)), ("neo-Hookean", grid(24, 6))):
         deck, pressure = fem.Deck(points, faces, law), fem.PRESSURE if len(plan) > 32 else 0
-        u = [deck.solve(f"{law}{len(plan)}_{i}", row[:3], pressure * row[3])[0] for i, row in enumerate(plan)]
-        yield Set(f"CalculiX, {law}, {len(plan)}", points, faces, plan, u)
+        solve = lambda row, deck=deck, pressure=pressure: deck.solve("run", row[:3], pressure * row[3])[0]
+        yield Set(f"CalculiX, {law}, {len(plan)}", points, faces, plan, solve)
 
 
 def gravity_part(given):
@@ -215,8 +218,8 @@ def stray(given):
 
 
 def best_fit(plan, u, kept):
-    """Return band, order and the leave-one-out errors of the runs `kept`, of the fit with the least of them; volumes as
-    `fill`."""
+    """Return band, order and the leave-one-out errors of the runs `kept`, of the fit with the least of them, and 1 - h
+    of each, with h the diagonal of the hat matrix; volumes as `fill`."""
     best = None
     for order in range(1 if np.ptp(plan[:, 3]) > 0 else 0, min(4, len(np.unique(plan[kept, 3])) - 1) + 1):
         for band in range(6):
@@ -224,11 +227,12 @@ def best_fit(plan, u, kept):
             if a.shape[1] >= len(kept) or np.linalg.cond(a) > 100:
                 break
             hat = a @ np.linalg.pinv(a)
-            if (1 - np.diag(hat)).min() < 1e-3:
+            free = 1 - np.diag(hat)
+            if free.min() < 1e-3:
                 break
-            error = np.linalg.norm((u[kept] - hat @ u[kept]) / (1 - np.diag(hat))[:, None], axis=1)
+            error = np.linalg.norm(u[kept] - hat @ u[kept], axis=1) / free
             if best is None or (error ** 2).sum() < (best[2] ** 2).sum():
-                best = band, order, error
+                best = band, order, error, free
     return best
 
 
@@ -238,24 +242,24 @@ def fit_terms(plan, band, order):
 
 
 def worst_run(given):
-    """Largest error of three runs that were taken out, predicted from the others / median error of these, above a
-    twentieth of the RMS."""
+    """Largest error of three runs that were taken out, predicted from the others / upper quartile of the errors of
+    these, above a twentieth of the RMS; each error divided by the norm of the weights of its prediction."""
     u = given.u[:, ::max(1, len(given.points) // POINTS)].reshape(len(given.u), -1)
     kept, out, size = np.arange(len(u)), [], np.sqrt((u ** 2).sum(1).mean())
-    band, order, error = best_fit(given.plan, u, kept)
+    band, order, error, free = best_fit(given.plan, u, kept)
     while len(out) < min(3, len(u) // 8):
         out.append(kept[error.argmax()])
         kept = np.delete(kept, error.argmax())
-        band, order, error = best_fit(given.plan, u, kept)
-    weights = np.linalg.pinv(fit_terms(given.plan[kept], band, order))
-    missed = np.linalg.norm(u[out] - fit_terms(given.plan[out], band, order) @ (weights @ u[kept]), axis=1)
-    ratio = missed / np.median(error)
+        band, order, error, free = best_fit(given.plan, u, kept)
+    weights = fit_terms(given.plan[out], band, order) @ np.linalg.pinv(fit_terms(given.plan[kept], band, order))
+    missed = np.linalg.norm(u[out] - weights @ u[kept], axis=1)
+    ratio = missed / np.sqrt(1 + (weights ** 2).sum(1)) / np.percentile(error * np.sqrt(free), 75)
     return ratio.max(), ratio[missed > 0.05 * size].max(initial=0)
 
 
 def made_wrong(given):
     """Yield wrong versions of a set: what was done, and the set."""
-    change = lambda name, plan=given.plan, u=given.u: (name, Set(given.name, given.points, given.faces, plan, u))
+    change = lambda name, plan=given.plan, u=given.u: (name, Set(given.name, given.points, given.faces, plan, None, u))
     edit = lambda name, act: (lambda u: (act(u), change(name, u=u))[1])(given.u.copy())
     row = 7 if len(given.u) < 60 else 29
     yield change("gravity negated", given.plan * [-1, -1, -1, 1])
@@ -276,20 +280,19 @@ def write_surface(path, points, faces):
         np.savetxt(file, np.column_stack([np.full(len(faces), 3), faces]), "%d")
 
 
-def stated_and_found(package, given):
-    """Make a basis of a set without every fifth direction. Return the number of runs that were left out, how many of
-    them have volumes that the basis refuses, the warnings, the error of the basis and that of these runs, in parts
-    of the RMS displacement; and for each vertex the stated error / the found one: 5 %, median and 95 %."""
-    names = [tuple(row) for row in np.unique(given.plan[:, :3], axis=0)]
-    out = np.array([names.index(tuple(row)) % 5 == 2 for row in given.plan[:, :3]])
-    write_surface("set.ply", given.points, given.faces)
-    package.save_fields("set.safetensors", given.points, given.plan[~out, :3], given.u[~out])
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        basis = package.precompute("set.ply", fields="set.safetensors")
+def draw_between(given):
+    """Return rows of a plan between those of a set: other directions, evenly spread, and drawn fillings."""
+    rng = np.random.default_rng(11)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    filling = rng.uniform(0.05, 0.95, DRAWN) if np.ptp(given.plan[:, 3]) > 0 else np.zeros(DRAWN)
+    return np.column_stack([even(DRAWN) @ turn.T, filling])
+
+
+def find_errors(package, basis, given, rows, fields):
+    """Return the RMS error of each vertex of a basis in states of a set, mm, and how many volumes it refuses."""
     error, refused = [], 0
     order = [np.abs(given.points - x).sum(1).argmin() for x in basis.vertices]  # vertices are grouped by lung
-    for row, u in zip(given.plan[out], given.u[out]):
+    for row, u in zip(rows, fields):
         volume = {}
         for name, (begin, end) in lungs_of(basis).items() if np.ptp(given.plan[:, 3]) > 0 else ():
             own = basis.triangles[(basis.triangles[:, 0] >= begin) & (basis.triangles[:, 0] < end)]
@@ -297,15 +300,32 @@ def stated_and_found(package, given):
             volume[name] = f"{abs(np.einsum('ij,ij->', a, np.cross(b, c))) / 6000:.6f}mL"
         try:
             pose = basis.pose(tuple(row[:3]), volume)
-        except package.NumericalError:  # beyond the smallest or the largest volume of the other directions
+        except package.NumericalError:  # beyond the smallest or the largest volume of the directions of the basis
             refused += 1
             continue
         error.append(basis.deform(pose) - (given.points + u)[order])
-    found = np.sqrt((np.array(error) ** 2).sum(2).mean(0))
-    stated = np.array(basis.tensor("error_vertices"))
-    size = np.sqrt((given.u ** 2).sum(2).mean())
-    return (out.sum(), refused, len(told), np.sqrt((stated ** 2).mean()) / size, np.sqrt((found ** 2).mean()) / size,
-            *np.percentile(stated / found, (5, 50, 95)))
+    return np.sqrt((np.array(error) ** 2).sum(2).mean(0)), refused
+
+
+def stated_and_found(package, given):
+    """Make a basis of a set without every fifth direction. Return the error that it states, in parts of the RMS
+    displacement, and the number of warnings; then, for states between the runs and for the runs that were left out,
+    their number, the volumes that the basis refuses, the error that is found, and for each vertex the stated error /
+    the found one: 5 %, median and 95 %."""
+    names = [tuple(row) for row in np.unique(given.plan[:, :3], axis=0)]
+    out = np.array([names.index(tuple(row)) % 5 == 2 for row in given.plan[:, :3]])
+    write_surface("set.ply", given.points, given.faces)
+    package.save_fields("set.safetensors", given.points, given.plan[~out, :3], given.u[~out])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        basis = package.precompute("set.ply", fields="set.safetensors")
+    stated, size = np.array(basis.tensor("error_vertices")), np.sqrt((given.u ** 2).sum(2).mean())
+    drawn, results = draw_between(given), []
+    for rows, fields in ((drawn, [given.law(row) for row in drawn]), (given.plan[out], given.u[out])):
+        found, refused = find_errors(package, basis, given, rows, fields)
+        results.append((len(rows), refused, np.sqrt((found ** 2).mean()) / size,
+                        *np.percentile(stated / found, (5, 50, 95))))
+    return np.sqrt((stated ** 2).mean()) / size, len(told), results
 
 
 def lungs_of(basis):
@@ -327,21 +347,46 @@ def all_sets(package, build, paths):
         print("CalculiX or TetGen is not installed: its sets are not measured")
 
 
+def distances(given):
+    """Return how far a set is from runs of zeros, copies, repeated directions and unequal gravity: the smallest RMS
+    displacement of a run and the smallest difference of two / RMS of all; the smallest angle between two directions,
+    degrees; the longest / the shortest direction, rounded to two decimals."""
+    flat, size = given.u.reshape(len(given.u), -1), np.sqrt((given.u ** 2).sum((1, 2)).mean())
+    square = flat @ flat.T
+    apart = square.diagonal()[:, None] + square.diagonal() - 2 * square + np.diag([np.inf] * len(flat))
+    g = np.unique(given.plan[:, :3], axis=0)
+    angle = np.degrees(np.arccos(np.clip(g @ g.T - 2 * np.eye(len(g)), -1, 1))).min()
+    lengths = np.linalg.norm(np.round(g, 2), axis=1)
+    return np.sqrt(square.diagonal().min()) / size, np.sqrt(apart.min()) / size, angle, lengths.max() / lengths.min()
+
+
+def zero_run(given):
+    """RMS prediction of a run of zeros / median error of all runs, and / RMS displacement; 0 without such a run."""
+    u = given.u[:, ::max(1, len(given.points) // POINTS)].reshape(len(given.u), -1)
+    zeros = np.flatnonzero(~u.any(1))
+    if len(zeros) == 0:
+        return 0, 0
+    error = best_fit(given.plan, u, np.arange(len(u)))[2]
+    return error[zeros[0]] / np.median(error), error[zeros[0]] / np.sqrt((u ** 2).sum(1).mean())
+
+
 def measure_sets(package, build, paths):
-    print("\nEach right set: a fifth of the directions is left out, and found again. A basis is refused if its own "
-          "error, stated, is above 50 %.\nThen the set, and what was made wrong in it, as the checks measure it.")
+    print("\nEach right set: a fifth of the directions is left out of a basis, whose stated error is compared. Then "
+          "the set, and what was\nmade wrong in it, as the checks measure it.")
     for given in all_sets(package, build, paths):
-        left, refused, told, stated, found, *ratios = stated_and_found(package, given)
-        print(f"\n{given.name}: {left} runs left out, {refused} refused, {told} warnings; error stated "
-              f"{100 * stated:.2f} %, found {100 * found:.2f} %: {stated / found:.2f} times; of a vertex "
-              f"5 % {ratios[0]:.2f}, median {ratios[1]:.2f}, 95 % {ratios[2]:.2f}")
+        stated, told, results = stated_and_found(package, given)
+        print(f"\n{given.name}: {told} warnings; error stated {100 * stated:.2f} %")
+        for where, (count, refused, found, *ratios) in zip(("between the runs", "in directions left out"), results):
+            print(f"  {where}: {count} states, {refused} refused; found {100 * found:.2f} %: {stated / found:.2f} "
+                  f"times; of a vertex 5 % {ratios[0]:.2f}, median {ratios[1]:.2f}, 95 % {ratios[2]:.2f}")
+        print("  smallest run {:.2f} and difference of two runs {:.3f} of the RMS; directions {:.0f} degrees apart; "
+              "longest / shortest, rounded, {:.3f}".format(*distances(given)))
         print(f"{'':28} {'runs':>4} {'what is wrong':20} {'gravity, mm':>11} {'axes':>5} {'point':>6} {'run':>6} "
-              f"{'run, large':>10}")
+              f"{'run, large':>10} {'zeros':>6} {'part':>5}")
         for wrong, now in [("", given), *made_wrong(given)]:
-            moved, run = np.sqrt((gravity_part(now) ** 2).sum(2).mean()), worst_run(now)
+            moved, run, zeros = np.sqrt((gravity_part(now) ** 2).sum(2).mean()), worst_run(now), zero_run(now)
             print(f"{given.name:28} {len(given.u):4} {wrong:20} {moved:11.1f} {frame_gain(now):5.2f} "
-                  f"{stray(now):6.1f} {run[0]:6.1f} {run[1]:10.1f}",
-                  flush=True)
+                  f"{stray(now):6.1f} {run[0]:6.1f} {run[1]:10.1f} {zeros[0]:6.1f} {zeros[1]:5.2f}", flush=True)
 
 
 def main():
