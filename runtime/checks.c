@@ -62,6 +62,26 @@ bool supine_basis_allows_folds(const supine_basis *basis) {
   return basis->allow_folds;
 }
 
+/* Return whether the gains of a pose can be right. They are limited where no volume limits them: if
+ * a state names none, and the file does not say what its lungs can hold. */
+static bool can_gain(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
+                     char *wrong, size_t size) {
+  double gain = 0;
+  if (basis->volume_range != NULL || state->lung_count > 0 ||
+      state->volume.kind != SUPINE_VOLUME_DEFAULT) {
+    return true;
+  }
+  for (size_t i = 0; i < 3 * basis->info.lung_count; ++i) {
+    const double of_axis = pose->gains[i / 3][i % 3];
+    gain = fabs(of_axis) > fabs(gain) ? of_axis : gain;
+  }
+  const double most = supine_input_get(SUPINE_INPUT_GAIN)->refused;
+  (void)supine_print_text(wrong, size,
+                          "the gain %.6g multiplies every displacement, outside -%g to %g", gain,
+                          most, most);
+  return supine_input_judge(SUPINE_INPUT_GAIN, fabs(gain)) == SUPINE_INPUT_TAKEN;
+}
+
 /* Return whether lungs can hold the volumes of a pose. If not, write to `wrong` what is wrong. */
 static bool can_hold(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
                      char *wrong, size_t size) {
@@ -113,39 +133,40 @@ static bool can_hold(const supine_basis *basis, const supine_state *state, const
   return true;
 }
 
-/* Add to the error of a pose that lungs cannot hold how it can be allowed. */
-static supine_status advise_folds(supine_error *error) {
-  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_allow_folds()};
-  return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);
-}
-
-/* Return whether lungs can hold a pose; if not, write the state and why. */
-static bool judge(const supine_basis *basis, const supine_state *state, const supine_pose *pose,
-                  char text[420]) {
+/* Return what to do about a pose that lungs cannot hold, or NULL if they can. Write the state and
+ * what is wrong to `text`. */
+static const char *judge(const supine_basis *basis, const supine_state *state,
+                         const supine_pose *pose, char text[420]) {
   char wrong[256];
-  if (can_hold(basis, state, pose, wrong, sizeof wrong)) {
-    return true;
+  const char *remedy = "give a smaller gain";
+  if (can_gain(basis, state, pose, wrong, sizeof wrong)) {
+    if (can_hold(basis, state, pose, wrong, sizeof wrong)) {
+      return NULL;
+    }
+    remedy = "choose a volume nearer to rest";
   }
   (void)supine_state_describe(state, text, 160);
   const size_t length = strlen(text);
   (void)supine_print_text(text + length, 420 - length, ": %s", wrong);
-  return false;
+  return remedy;
 }
 
 supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
                                  const supine_pose *pose, supine_error *error) {
   char text[420];
-  if (judge(basis, state, pose, text)) {
+  const char *remedy = judge(basis, state, pose, text);
+  if (remedy == NULL) {
     return SUPINE_OK;
   }
-  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: choose a volume nearer to rest", text);
-  return advise_folds(error);
+  const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_allow_folds()};
+  (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL, "%s: %s", text, remedy);
+  return supine_error_advised(error, advice, SUPINE_ERROR_NUMERICAL);
 }
 
 void supine_basis_tell(const supine_basis *basis, const supine_state *state,
                        const supine_pose *pose, supine_findings *findings) {
   char text[420];
-  if (!judge(basis, state, pose, text)) {
+  if (judge(basis, state, pose, text) != NULL) {
     supine_findings_warn(findings, "%s", text);
   }
 }
@@ -176,18 +197,7 @@ supine_status supine_basis_pose_gain(const supine_basis *basis, const double gra
                             "gravity is zero or not finite: give a vector with a direction");
   }
   supine_pose_fill(pose, gain);
-  if (basis->allow_folds) {
-    return SUPINE_OK;
-  }
-  if (basis->volume_range == NULL &&
-      supine_input_judge(SUPINE_INPUT_GAIN, fabs(gain)) == SUPINE_INPUT_REFUSED) {
-    (void)supine_error_set(error, SUPINE_ERROR_NUMERICAL,
-                           "the gain %.6g multiplies every displacement: give a gain of -%g to %g",
-                           gain, supine_input_get(SUPINE_INPUT_GAIN)->refused,
-                           supine_input_get(SUPINE_INPUT_GAIN)->refused);
-    return advise_folds(error);
-  }
-  return supine_basis_check(basis, &state, pose, error);
+  return basis->allow_folds ? SUPINE_OK : supine_basis_check(basis, &state, pose, error);
 }
 
 supine_status supine_basis_scan_pose(const supine_basis *basis, supine_pose *pose,

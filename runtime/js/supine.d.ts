@@ -64,7 +64,8 @@ export interface Basis {
   readonly facts: Fact[];
   /** All facts with a caveat as one line, which views of the lungs must show. */
   readonly caveats: string;
-  /** What the checks tell of the pose: with `allowFolds`, why lungs cannot hold it; otherwise it is refused. */
+  /** What the checks tell of the pose, and of the state from which the last `targets` have moved: with `allowFolds`, why
+   * lungs cannot hold it; otherwise it is refused. */
   readonly findings: Finding[];
   /** Positions [3 N], mm, of the last `deform` or `deformLit`; at first the reference positions. */
   readonly positions: Float32Array;

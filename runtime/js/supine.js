@@ -95,6 +95,7 @@ class Basis {
   #expected;
   #facts;
   #isChecked = false; // whether the pose is that of the state, which poseScan does not set
+  #sinceFindings = []; // of the state from which the last targets have moved
 
   constructor(instance, bytes, options) {
     this.#c = instance.exports;
@@ -205,6 +206,7 @@ class Basis {
     }
     this.#take();
     this.#isChecked = true;
+    this.#sinceFindings = [];
     return this;
   }
 
@@ -212,6 +214,7 @@ class Basis {
     this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
     this.#take();
     this.#isChecked = false;
+    this.#sinceFindings = [];
     return this;
   }
 
@@ -285,8 +288,11 @@ class Basis {
   }
 
   get findings() {
-    if (!this.#isChecked) return [];
-    const status = this.#c.supine_basis_check(this.#basis, this.#state, this.#pose, this.#error);
+    return [...(this.#isChecked ? this.#judge(this.#state, this.#pose) : []), ...this.#sinceFindings];
+  }
+
+  #judge(state, pose) {
+    const status = this.#c.supine_basis_check(this.#basis, state, pose, this.#error);
     return status === 0 ? [] : [{ warning: true, text: this.#string(this.#error + 4) }];
   }
 
@@ -324,11 +330,12 @@ class Basis {
     const after = this.deform().slice();
     const sigma = this.#expectedOrUnknown().slice();
     const moved = this.#expectedOrUnknown(since);
-    this.#check(
-      since === undefined
-        ? this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error)
-        : this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error),
-    );
+    if (since === undefined) {
+      this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
+    } else {
+      this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+      this.#sinceFindings = this.#judge(this.#nextState, this.#nextPose);
+    }
     this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
     const made = this.#emptyTargets();
     (this.tensor('part')?.data ?? []).forEach((index, v) => {

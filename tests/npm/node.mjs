@@ -166,6 +166,10 @@ assert.match(allowed.pose('supine:full+2L').findings[0].text, /of full inflation
 assert.equal(allowed.findings[0].warning, true);
 assert.equal(allowed.findings.length, 1);
 assert.deepEqual(allowed.pose('prone').findings, []);
+const folding = await open(readFileSync(inside), { allowFolds: true });
+folding.pose('prone').targets('supine:full+2L');
+assert.match(folding.findings[0].text, /^supine at full inflation \+ 2000 mL: .* of full inflation/);
+assert.deepEqual(folding.pose('prone').findings, []);
 for (const gain of [NaN, Infinity])
   assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
@@ -219,12 +223,17 @@ shifted.forEach(({ at, move, mm, expectedError }, i) => {
 });
 
 /* A basis of an open surface has no volumes. A pose needs a gain, the displacement factor. */
-const opened = await open(readFileSync(join(dirname(process.env.GOLDEN), 'open_surface.safetensors')));
+const openSurface = join(dirname(process.env.GOLDEN), 'open_surface.safetensors');
+const opened = await open(readFileSync(openSurface));
 assert.throws(() => opened.volumes, { status: 'open surface' });
 assert.throws(() => opened.pose('prone:rest+500'), SupineError);
 opened.pose({ gravity: [0, -1, 0], gain: 3 }).deformLit();
 assert.notDeepEqual(opened.positions, opened.vertices);
 assert.ok(Math.abs(Math.hypot(...opened.normals.slice(0, 3)) - 1) < 1e-6);
+const gained = { gravity: [0, -1, 0], gain: 9.81 };
+assert.throws(() => opened.pose(gained), { status: 'numerical', message: /the gain 9.81 .* outside -5 to 5/ });
+const taken = await open(readFileSync(openSurface), { allowFolds: true });
+assert.match(taken.pose(gained).findings[0].text, /the gain 9.81 .* outside -5 to 5/);
 
 /* The JavaScript examples in the README.md of the package and in that of the project run without errors. */
 for (const readme of [join(packed, 'README.md'), process.env.README]) {

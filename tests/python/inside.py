@@ -114,13 +114,14 @@ assert np.abs(lungs.deform(lungs.pose("prone").fill(1.0)) - lungs.deform(full)).
 refused(supine.NumericalError, "of full inflation", lungs.pose("prone").fill, 9.81)
 refused(supine.ArgumentError, "finite", lungs.pose("prone").fill, np.nan)
 allowed = supine.open(path, allow_folds=True)
-allowed.pose("prone").fill(9.81)
 with warnings.catch_warnings(record=True) as said:
     warnings.simplefilter("always")
     allowed.pose("prone")
     assert not said, said
     allowed.pose("supine:full+2L")
     assert len(said) == 1 and "outside the 10 to 120 %" in str(said[0].message), said
+    allowed.pose("prone").fill(9.81)
+    assert len(said) == 2 and "of full inflation" in str(said[1].message), said
 
 # A number is neither a volume nor a state.
 for wrong in (2600, 2600.0, np.float64(2600)):

@@ -443,7 +443,7 @@ TEST(test_open_damaged_content_remedy_is_embed) {
   parts p = sound();
   p.metadata[p.metadata_count++] = (supine_metadata){"content", "points"};
   p.tensors[0].dtype = SUPINE_F64;
-  p.message = "make the file again with 'supine embed'";
+  p.message = "embed its content again";
   assert_int_equal(open_parts(&p), SUPINE_ERROR_FORMAT);
 }
 
@@ -568,8 +568,15 @@ TEST(test_pose_gain_beyond_limits_refused_unless_allowed) {
     const supine_status status = supine_basis_pose_gain(basis, gravity, -9.81, &pose, &error);
     assert_int_equal(status, allowed == 1 ? SUPINE_OK : SUPINE_ERROR_NUMERICAL);
     if (allowed == 0) {
-      assert_non_null(strstr(error.message, "give a gain of -5 to 5"));
+      assert_non_null(strstr(error.message, "outside -5 to 5: give a smaller gain"));
       assert_string_equal(error.remedies[0].argument, "allow_folds");
+    } else {
+      const supine_state state = {.gravity = {0, -2, 0}};
+      supine_findings findings = {.count = 0};
+      supine_basis_tell(basis, &state, &pose, &findings);
+      assert_int_equal(findings.count, 1);
+      assert_string_equal(findings.list[0].text,
+                          "prone: the gain -9.81 multiplies every displacement, outside -5 to 5");
     }
     assert_int_equal(supine_basis_pose_gain(basis, gravity, NAN, &pose, &error),
                      SUPINE_ERROR_ARGUMENT);

@@ -281,14 +281,15 @@ SUPINE_API supine_status supine_basis_coefficients(const supine_basis *basis, si
  * more than 1 % of the triangles of a lung. The file holds the range of volumes of each lung in 26
  * directions of gravity; between them it is interpolated. Folds are not checked if a file lacks
  * these ranges, and volumes if it lacks the volume at rest. The state of the scan is taken. Limits:
- * supine_input_get. Cost: mode_count^3 for each lung.
- * @param state  the state of the pose
+ * supine_input_get. If the state names no volume, and the file lacks these ranges, check instead
+ * that the gains are -5 to 5 (SUPINE_INPUT_GAIN). Cost: mode_count^3 for each lung.
+ * @param state  the state of the pose; that of supine_basis_pose_gain has no volume
  * @retval SUPINE_ERROR_NUMERICAL  lungs cannot hold these volumes; `error` says which */
 SUPINE_API supine_status supine_basis_check(const supine_basis *basis, const supine_state *state,
                                             const supine_pose *pose, supine_error *error);
 
 /** Tell what supine_basis_check refuses in a pose, as a warning: what a host does after
- * supine_basis_pose with supine_basis_options.allow_folds.
+ * supine_basis_pose or supine_basis_pose_gain with supine_basis_options.allow_folds.
  * @param findings  the warning is added, if lungs cannot hold the pose */
 SUPINE_API void supine_basis_tell(const supine_basis *basis, const supine_state *state,
                                   const supine_pose *pose, supine_findings *findings);
@@ -301,10 +302,8 @@ SUPINE_API supine_volume supine_basis_default_volume(const supine_basis *basis);
  * whatever volume that gives. Use this where the gains do not follow from a volume: for open
  * surfaces, or for displacements from another simulator, which a gain of 1 reproduces.
  *
- * The pose is checked as by supine_basis_check if the file has the volumes that its lungs can hold.
- * For other files, the gain may be from -5 to 5 (supine_input_get, SUPINE_INPUT_GAIN). Neither is
- * checked if the basis was opened with supine_basis_options.allow_folds. Cost: as
- * supine_basis_pose.
+ * The pose is checked by supine_basis_check, unless the basis was opened with
+ * supine_basis_options.allow_folds. Cost: as supine_basis_pose.
  * @param gravity  [3], any length but 0
  * @param pose     written
  * @retval SUPINE_ERROR_ARGUMENT     gravity is zero or not finite, or the gain is not finite
@@ -480,9 +479,9 @@ SUPINE_API supine_status supine_gl_pack(const supine_basis *basis, size_t begin,
  * @param weights  [4 ceil(mode_count / 4)], written; [lung_count, 4 ceil(mode_count / 4)] if
  *                 supine_basis_info.order is above 0, which needs SUPINE_BY_LUNG in supine.glsl
  * @param gains    [lung_count, 3], written
- * @retval SUPINE_ERROR_UNSUPPORTED  the basis has clusters; or supine_pose.expansion is not 0, which
- *                                   the shader lacks. Any number of modes is legal: a shader may
- *                                   read coefficients from a texture */
+ * @retval SUPINE_ERROR_UNSUPPORTED  the basis has clusters; or supine_pose.expansion is not 0,
+ * which the shader lacks. Any number of modes is legal: a shader may read coefficients from a
+ * texture */
 SUPINE_API supine_status supine_gl_weights(const supine_basis *basis, const supine_pose *pose,
                                            float *weights, float *gains);
 

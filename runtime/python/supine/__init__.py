@@ -140,12 +140,14 @@ class Pose(_c.CPose):
 
     def fill(self, gain: float) -> Pose:
         """Multiply all displacements by `gain`. Use this where no volume is known, such as for open surfaces. Volumes
-        that lungs cannot hold are refused, as by `Basis.pose`."""
+        that lungs cannot hold are refused or told, as by `Basis.pose`."""
         if not np.isfinite(gain):
             raise ArgumentError(f"the gain is {gain}: give a finite number")
         if self._made is not None:
             owner, gravity = self._made
-            _c.basis_pose_gain(owner.pointer, gravity, gain, Pose())
+            made = Pose()
+            _c.basis_pose_gain(owner.pointer, gravity, gain, made)
+            owner.tell(_c.State(gravity), made)
         np.ctypeslib.as_array(self.gains)[:] = gain
         return self
 
@@ -196,6 +198,7 @@ class _Owner:
     def __init__(self, source: Source, options: _c.Options) -> None:
         self.pointer = ctypes.c_void_p()
         self.source = source
+        self.allow_folds: bool = options.allow_folds
         if isinstance(source, (bytes, bytearray, memoryview)):
             self.bytes = np.frombuffer(source, np.uint8)  # keep the bytes alive while the basis exists
             _c.basis_open_memory(self.bytes.ctypes.data, self.bytes.size, options, self.pointer)
@@ -204,6 +207,13 @@ class _Owner:
 
     def __del__(self) -> None:
         _c.basis_close(self.pointer)
+
+    def tell(self, state: Any, pose: Pose) -> None:
+        """Warn of a pose that lungs cannot hold, if the basis was opened to compute it all the same."""
+        if self.allow_folds:
+            findings = _c.Findings()
+            _c.basis_tell(self.pointer, state, pose, findings)
+            _program.warn(_program.told(findings))
 
     def view(self, data: int, kind: Any, shape: Sequence[int]) -> NDArray[Any]:
         """Return memory of the basis as a read-only array."""
@@ -377,10 +387,7 @@ class Basis:
         out, wanted = Pose() if out is None else out, _state(state, volume)
         _c.basis_pose(self._c, wanted, out)
         out._made = self._owner, wanted.gravity
-        if self._options["allow_folds"]:
-            findings = _c.Findings()
-            _c.basis_tell(self._c, wanted, out, findings)
-            _program.warn(_program.told(findings))
+        self._owner.tell(wanted, out)
         return out
 
     def expected_error(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> Floats:
@@ -459,7 +466,7 @@ class Basis:
         if since is None:
             _c.basis_scan_pose(self._c, origin)
         else:
-            _c.basis_pose(self._c, _state(since), origin)
+            self.pose(since, out=origin)
         after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
             sigma: Any = self.expected_error(state, volume)
