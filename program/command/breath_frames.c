@@ -190,7 +190,7 @@ supine_status supine_command_breath_write(const supine_command_breath_frames *wa
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &save, error));
   SUPINE_TRY(begin_frames(&p, !tensors, error));
   SUPINE_TRY(find_volumes(&p, error));
-  SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &from, error));
+  SUPINE_TRY(supine_options_reference(basis, name, &wanted->from, false, &from, error));
   SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
   supine_options_signals_catch(true);
   p.progress = supine_options_progress_begin(name);

@@ -115,7 +115,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   const char *by = "";
   char comment[384 + SUPINE_CAVEATS_SIZE];
   char caveats[SUPINE_CAVEATS_SIZE];
-  SUPINE_TRY(supine_options_reference(basis, &wanted->from, false, &moved.from, error));
+  SUPINE_TRY(supine_options_reference(basis, name, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
   if (wanted->sample_given) { /* one of many lungs: what is expected of the prediction is not its */

@@ -191,7 +191,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                    "a grid or an image cannot be embedded with other content: embed it alone, or "
                    "give --labels to embed the parts of a label map");
   SUPINE_TRY(
-      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, true, &basis, error));
+      supine_options_basis_open(given->operand[0], SUPINE_STORAGE_AUTO, false, &basis, error));
   return embed(basis, wanted, given, error);
 }
 

@@ -117,8 +117,8 @@ static supine_status find_references(const supine_basis *basis, const supine_fro
                                      supine_error *error) {
   const supine_from none = {.given = false};
   for (size_t i = 0; i < 3; ++i) {
-    SUPINE_TRY(
-        supine_options_reference(basis, i == 0 ? from : &none, i != 1, &found[*count], error));
+    SUPINE_TRY(supine_options_reference(basis, name, i == 0 ? from : &none, i != 1, &found[*count],
+                                        error));
     bool again = is_before_collapse(basis, &found[*count]);
     SUPINE_REFUSE_IF(again && from->given && i == 0, error, SUPINE_ERROR_UNSUPPORTED,
                      "--from: a page cannot show lungs before their collapse, as in the scan: give "

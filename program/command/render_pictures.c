@@ -97,7 +97,7 @@ static void tell_letters(const studio *s) {
 static supine_status open_studio(studio *s, const char *path, supine_error *error) {
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, s->wanted->volume.allow_folds,
                                        &s->basis, error));
-  SUPINE_TRY(supine_options_reference(s->basis, &s->wanted->from, true, &s->from, error));
+  SUPINE_TRY(supine_options_reference(s->basis, name, &s->wanted->from, true, &s->from, error));
   SUPINE_TRY(supine_compare_create(s->basis, &s->compare, error));
   (void)supine_basis_caveats(s->basis, s->caveats, sizeof s->caveats);
   if (s->wanted->inside != NULL) {

@@ -124,7 +124,7 @@ static void page_close(live_page *page) {
 static supine_status print_page(const supine_stream_session *wanted, const supine_basis *basis,
                                 live_page *page, supine_error *error) {
   supine_options_reference_pose from;
-  SUPINE_TRY(supine_options_reference(basis, &wanted->from, true, &from, error));
+  SUPINE_TRY(supine_options_reference(basis, "stream", &wanted->from, true, &from, error));
   const export_page shown = {.breath = wanted->breath.tidal,
                              .from = &from,
                              .from_count = 1,

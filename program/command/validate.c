@@ -150,7 +150,9 @@ static supine_status validate_state(const request *wanted, supine_validation *s,
   const supine_lungs *scan = path != NULL ? &lungs : NULL;
   const supine_patient_pairs *given = landmarks != NULL ? &pairs : NULL;
   SUPINE_TRY(tell_other_person(s, i, scan, given, error));
-  return supine_validation_compare(s, i, scan != NULL ? &scan->mesh : NULL, given, error);
+  SUPINE_TRY(supine_validation_compare(s, i, scan != NULL ? &scan->mesh : NULL, given, error));
+  return supine_options_tell_folds(s->basis, name, &s->outcome[i].state, &s->outcome[i].pose,
+                                   error);
 }
 
 static supine_status validate(const request *wanted, supine_validation *s, supine_error *error) {
@@ -187,6 +189,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(supine_options_basis_open(path, SUPINE_STORAGE_AUTO, true, &basis, error));
   s.basis = basis;
   SUPINE_TRY(supine_validation_begin(&s, error));
+  if (wanted->from.text[0] != '\0') {
+    supine_pose pose;
+    SUPINE_TRY(supine_options_pose(basis, name, &s.from.state, &pose, error));
+  }
   SUPINE_TRY(validate(wanted, &s, error));
   supine_command_print_validation(&s);
   return SUPINE_OK;

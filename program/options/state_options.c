@@ -139,8 +139,9 @@ const supine_option supine_options_from[] = {FROM("supine:rest, or the scan if r
                                              {.name = NULL}};
 const supine_option supine_options_from_scan[] = {FROM("scan"), {.name = NULL}};
 
-supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
-                                       bool compares, supine_options_reference_pose *reference,
+supine_status supine_options_reference(const supine_basis *basis, const char *command,
+                                       const supine_from *from, bool compares,
+                                       supine_options_reference_pose *reference,
                                        supine_error *error) {
   const supine_state in_scan = supine_basis_scan(basis);
   supine_state state = {.gravity = {0.0, 1.0, 0.0}, .volume = {SUPINE_VOLUME_REST, 0.0}};
@@ -172,6 +173,9 @@ supine_status supine_options_reference(const supine_basis *basis, const supine_f
   reference->scan = scan;
   if (status != SUPINE_OK) {
     return supine_error_wrap(error, &inner, "%s", from->given ? "--from: " : "");
+  }
+  if (from->given && !scan) {
+    SUPINE_TRY(supine_options_tell_folds(basis, command, &state, &reference->pose, error));
   }
   if (state.lung_count == 0 && state.volume.kind == SUPINE_VOLUME_DEFAULT) {
     state.volume = supine_basis_default_volume(basis); /* the name states the volume */
@@ -218,9 +222,9 @@ supine_status supine_options_plausible(const supine_plausible *lungs, supine_err
 }
 
 /* Warn if more than the share of the check `folds` of the triangles of a pose turn over. */
-static supine_status tell_folds(const supine_basis *basis, const char *command,
-                                const supine_state *state, const supine_pose *pose,
-                                supine_error *error) {
+static supine_status tell_triangles(const supine_basis *basis, const char *command,
+                                    const supine_state *state, const supine_pose *pose,
+                                    supine_error *error) {
   supine_plausible lungs = {.command = command,
                             .state = state,
                             .parts = "the surface folds; triangles that turn over",
@@ -233,15 +237,21 @@ static supine_status tell_folds(const supine_basis *basis, const char *command,
   return supine_options_plausible(&lungs, error);
 }
 
-supine_status supine_options_pose(const supine_basis *basis, const char *command,
-                                  const supine_state *state, supine_pose *pose,
-                                  supine_error *error) {
+supine_status supine_options_tell_folds(const supine_basis *basis, const char *command,
+                                        const supine_state *state, const supine_pose *pose,
+                                        supine_error *error) {
   supine_findings findings = {.count = 0};
-  SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
   if (!supine_basis_has_range_of_volumes(basis)) {
-    return tell_folds(basis, command, state, pose, error);
+    return tell_triangles(basis, command, state, pose, error);
   }
   supine_basis_tell(basis, state, pose, &findings);
   supine_options_say_findings(command, &findings);
   return SUPINE_OK;
+}
+
+supine_status supine_options_pose(const supine_basis *basis, const char *command,
+                                  const supine_state *state, supine_pose *pose,
+                                  supine_error *error) {
+  SUPINE_TRY(supine_basis_pose(basis, state, pose, error));
+  return supine_options_tell_folds(basis, command, state, pose, error);
 }

@@ -99,10 +99,11 @@ typedef struct supine_options_reference_pose {
 } supine_options_reference_pose;
 
 /* Choose the state that displacements are measured from: the state of --from if it is given; supine
- * at rest if the command compares postures and rest is known; the scan in all other cases. Statuses
- * as supine_basis_pose. */
-supine_status supine_options_reference(const supine_basis *basis, const supine_from *from,
-                                       bool compares, supine_options_reference_pose *reference,
+ * at rest if the command compares postures and rest is known; the scan in all other cases. Warn of
+ * the state of --from as supine_options_pose does. Statuses as supine_basis_pose. */
+supine_status supine_options_reference(const supine_basis *basis, const char *command,
+                                       const supine_from *from, bool compares,
+                                       supine_options_reference_pose *reference,
                                        supine_error *error);
 
 /* What decides whether the lungs in a state are plausible. */
@@ -119,8 +120,14 @@ typedef struct supine_plausible {
  * over. */
 supine_status supine_options_plausible(const supine_plausible *lungs, supine_error *error);
 
-/* Compute the pose of a state, which supine_basis_pose judges. Warn of a state that the basis was
- * opened to allow and, if the basis does not say which volumes its lungs can hold, of folds. */
+/* Warn of a pose that supine_basis_check refuses, as the basis was opened to allow it, or, if the
+ * basis does not say which volumes its lungs can hold, of triangles that turn over. */
+supine_status supine_options_tell_folds(const supine_basis *basis, const char *command,
+                                        const supine_state *state, const supine_pose *pose,
+                                        supine_error *error);
+
+/* Compute the pose of a state, which supine_basis_pose judges, and call supine_options_tell_folds.
+ */
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error);

@@ -128,7 +128,7 @@ supine_status supine_report_find(supine_comparison *c, supine_error *error) {
   if (arena.failed || c->posture == NULL) {
     return supine_error_memory(error, "%zu vertices", n);
   }
-  SUPINE_TRY(supine_options_reference(c->basis, &c->from, true, &c->reference, error));
+  SUPINE_TRY(supine_options_reference(c->basis, command, &c->from, true, &c->reference, error));
   SUPINE_TRY(supine_compare_create(c->basis, &c->compare, error));
   for (size_t i = 0; i < count; ++i) {
     supine_error wrong = {.message = ""};
