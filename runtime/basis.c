@@ -29,8 +29,8 @@ static supine_status SUPINE_PRINTF(2, 3) refuse(const check *c, const char *form
   (void)supine_print_text_list(detail, sizeof detail, format, arguments);
   va_end(arguments);
   const bool embedded = supine_safetensors_metadata(c->file, "content") != NULL;
-  return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s: make the file again with '%s'",
-                          c->name, detail, embedded ? "supine embed" : "supine precompute");
+  return supine_error_set(c->error, SUPINE_ERROR_FORMAT, "%s: %s: %s", c->name, detail,
+                          embedded ? "embed its content again" : "make the basis again");
 }
 
 /* Return whether all numbers are finite and below 2^30 in magnitude, as all numbers of a valid file
@@ -108,8 +108,8 @@ static supine_status check_metadata(const check *c, supine_basis_info *info) {
   const char *kind = supine_safetensors_metadata(c->file, "kind");
   if (format == NULL || strcmp(format, "supine-basis") != 0) {
     return supine_error_set(c->error, SUPINE_ERROR_FORMAT,
-                            "%s: a safetensors file, but not a Supine basis: make one with 'supine "
-                            "precompute'",
+                            "%s: a safetensors file, but not a Supine basis: give a basis, made "
+                            "from the surface of lungs",
                             c->name);
   }
   if (version == NULL || strcmp(version, "4") != 0) {

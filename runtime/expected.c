@@ -18,7 +18,7 @@ static const struct {
     {"displacement", "landmarks of full breaths (15 people) and of quiet breaths (10 people)"},
     {"turn", "a fit in one posture does not show the effect of a turn"},
     {"assumed volume",
-     "standard deviation of the share at rest in other people (supine info: resting shares)"},
+     "standard deviation of the share at rest in other people (metadata resting_spread)"},
     {"heart", "motion of the heart, supine to prone (Chino & Marks 2008, n 16)"},
     {"sliding", "assumed: sliding of the lungs along gravity, which the model lacks"},
     {"collapse", "assumed: as much as the collapse moves the tissue; no collapse was measured"}};

@@ -195,8 +195,8 @@ static supine_status reference_gains(const supine_basis *basis, const supine_sta
   }
   if (!reference) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
-                            "the surface is open and encloses no volume: close "
-                            "the mesh before 'supine precompute'");
+                            "the surface is open and encloses no volume: close the mesh, and make "
+                            "the basis again");
   }
   supine_pose_fill(pose, 0);
   return SUPINE_OK;

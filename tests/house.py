@@ -241,6 +241,7 @@ CALL = re.compile(r"\b((?:v|f|s|vf|vs|sn|vsn|d|as)?printf|"
                   r"graph|lower|print|punct|space|upper|xdigit)|to(?:lower|upper)|strn?casecmp|strcoll|json_\w+)\s*\(")
 REAL = re.compile(r"%[-+ #0]*(?:\*|\d+)?(?:\.(?:\*|\d+)?)?[lL]?[aAeEfFgG]")
 LITERAL = re.compile(r'"((?:\\.|[^"\\])*)"')
+ADJACENT = re.compile(r'"(?:\\.|[^"\\])*"(?:\s*"(?:\\.|[^"\\])*")*')  # literals that are one text
 
 
 def without_comments(text):
@@ -311,10 +312,12 @@ def check_distances(files):
 
 
 def check_remedies(files):
-    """Check that only the program names options, that remedies name arguments that commands have as options, and that
-    no error is set to the message of another without its remedies. Comments may name options, as an option is the
-    shortest name of what it sets."""
+    """Check that only the program names commands and options, that remedies name arguments that commands have as
+    options, and that no error is set to the message of another without its remedies. Comments may name options, as an
+    option is the shortest name of what it sets."""
     options, advised = set(), []
+    with open(os.path.join(source, "program", "command", "list.h"), encoding="utf-8") as opened:
+        command = re.compile(r"\bsupine (?:%s)\b" % "|".join(re.findall(r"^  COMMAND\((\w+)\)", opened.read(), re.M)))
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
             text = without_comments(opened.read())
@@ -324,6 +327,10 @@ def check_remedies(files):
                 line = text.count("\n", 0, literal.start()) + 1
                 faults.append(f"{file}:{line}: {name}: a library's message names the argument, and has a remedy "
                               f"(supine/status.h)")
+        for literal in ADJACENT.finditer(text if not file.startswith("program/") else ""):
+            if command.search("".join(LITERAL.findall(literal[0]))):
+                faults.append(f"{file}:{text.count(chr(10), 0, literal.start()) + 1}: a library's message says what to "
+                              f"do, and names no command")
         for call in re.finditer(r"\b(?:supine_error_set|SUPINE_REFUSE_IF|SUPINE_REFUSE_ADVISE)\(", text):
             if file != "base/status.c" and re.search(r"(?:\.|->)message\b(?!\[)", "".join(arguments(text, call.end()))):
                 line = text.count("\n", 0, call.start()) + 1

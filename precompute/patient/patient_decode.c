@@ -197,11 +197,11 @@ static supine_status check_version(const char *name, const json_t *root, supine_
   const json_t *version = json_object_get(root, "version");
   const bool known = format != NULL && strcmp(format, SUPINE_PATIENT_FORMAT) == 0;
   SUPINE_REFUSE_IF(!known || !json_is_integer(version), error, SUPINE_ERROR_FORMAT,
-                   "%s: not a patient file: make one with 'supine fit'", name);
+                   "%s: not a patient file: give one made from scans of the patient", name);
   SUPINE_REFUSE_IF(json_integer_value(version) != SUPINE_PATIENT_VERSION, error,
                    SUPINE_ERROR_FORMAT,
                    "%s: a patient file of version %" JSON_INTEGER_FORMAT
-                   ", but only version %d can be read: make a new one with 'supine fit'",
+                   ", but only version %d can be read: make it again from the scans",
                    name, json_integer_value(version), SUPINE_PATIENT_VERSION);
   return SUPINE_OK;
 }
@@ -219,7 +219,7 @@ static supine_status decode(const char *name, const json_t *json, const json_err
   check_record(record, &found);
   record->force.pair = true;
   SUPINE_REFUSE_IF(found.key[0] != '\0', error, SUPINE_ERROR_FORMAT,
-                   "%s: \"%s\" is missing or invalid: make a new file with 'supine fit'", name,
+                   "%s: \"%s\" is missing or invalid: make the file again from the scans", name,
                    found.key);
   return SUPINE_OK;
 }

@@ -109,7 +109,7 @@ static supine_status read_grid(const supine_basis *basis, supine_image *nodes,
     supine_image_locate(nodes, axes, axes);
   }
   SUPINE_REFUSE_IF(!valid || !isfinite(axes[0] + axes[1] + axes[2]), error, SUPINE_ERROR_FORMAT,
-                   "the grid in the basis is malformed: make it again with 'supine embed'");
+                   "the grid in the basis is malformed: embed a grid again");
   *part = of->data;
   *depth = deep->data;
   return SUPINE_OK;
