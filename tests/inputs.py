@@ -273,6 +273,7 @@ CASES = {
     "lungs-level": (lambda: made("lungs.ply"), lambda: made("apart.ply"), "told"),
     "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
     "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
+    "image-labels": (lambda: imaged(ct), lambda: imaged(sides.astype(ct.dtype)), "told"),
     "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
     "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),
     "ct-soft": (lambda: imaged(ct, "--density"), lambda: imaged(speckled(ct), "--density"), "told"),

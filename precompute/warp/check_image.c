@@ -8,6 +8,7 @@
 
 #include "base/arena.h"
 #include "base/number.h"
+#include "base/remedy.h"
 #include "precompute/lungs/belong.h"
 #include "precompute/warp/check_image.h"
 
@@ -148,6 +149,36 @@ static supine_status check_labels(const supine_field *field, const supine_image 
   return SUPINE_OK;
 }
 
+/* Warn of a label map that is given as an image: all values are whole numbers from 0, and few. */
+static supine_status check_no_labels(const supine_image *image, const char *path,
+                                     supine_findings *findings, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  bool *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
+  size_t count = 0;
+  SUPINE_TRY(supine_arena_check(&arena, error, "%d labels", (int)LABELS));
+  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+    const double value = supine_image_get(image, i);
+    if (!(value >= 0.0 && value < LABELS && value == rint(value))) {
+      return SUPINE_OK;
+    }
+    count += !found[(size_t)value];
+    found[(size_t)value] = true;
+    if (supine_input_judge(SUPINE_INPUT_IMAGE_LABELS, (double)count) == SUPINE_INPUT_TAKEN) {
+      return SUPINE_OK;
+    }
+  }
+  if (count > 1) {
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
+        supine_remedy_give("labels", "", "if it is a label map")};
+    supine_findings_warn(findings,
+                         "%s: it holds %zu different whole numbers, as a label map does, and is "
+                         "interpolated, which makes labels that the map lacks",
+                         path, count);
+    supine_findings_advise(findings, advice);
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_warp_check_image(const supine_field *field, const supine_image *image,
                                       const char *path, supine_warp_image_kind kind,
                                       supine_findings *findings, supine_error *error) {
@@ -166,6 +197,9 @@ supine_status supine_warp_check_image(const supine_field *field, const supine_im
     supine_findings_warn(findings, "%s: %s", path, text);
   } else if (kind == SUPINE_FIELD_LABELS) {
     SUPINE_TRY(check_labels(field, image, &s, path, findings, error));
+  }
+  if (kind == SUPINE_FIELD_IMAGE) {
+    SUPINE_TRY(check_no_labels(image, path, findings, error));
   }
   return SUPINE_OK;
 }

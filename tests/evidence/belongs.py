@@ -8,7 +8,8 @@ BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and ca
 are label maps of the lobes of further people. Prints, for docs/inputs.md, the share of the vertices of own and of
 others' lungs and lobes that lie more than 5 mm and an edge outside the surface of a basis and not between the lungs;
 how far the backs of two lungs are apart; and the share of the lungs that is no lung, hence without air, in the own CT,
-in the same 12 and 30 mm off, in the exhaled one, and in others'. Needs nibabel; exit code 77: no data."""
+in the same 12 and 30 mm off, in the exhaled one, and in others'; and how many different values label maps have, and
+the slices of CT, MR and scintigraphy that pydicom brings. Needs nibabel and pydicom; exit code 77: no data."""
 import glob
 import itertools
 import os
@@ -16,10 +17,13 @@ import subprocess
 import sys
 import tempfile
 
+import nibabel
 import numpy as np
+import pydicom
 
 from person import tensors
 
+SLICES = ("CT_small", "693_J2KI", "J2K_pixelrep_mismatch", "MR_small", "JPEG2000")  # files of pydicom
 FAST = ("--law", "paper", "--band", "3", "--held-out", "5")
 
 
@@ -65,7 +69,6 @@ def contents(supine, maps):
 
 def read_mask(path):
     """Return every third voxel of a label map, and its affine matrix, mm."""
-    import nibabel
     image = nibabel.load(path)
     return np.asarray(image.dataobj)[::3, ::3, ::3] > 0, image.affine @ np.diag([3, 3, 3, 1])
 
@@ -93,6 +96,14 @@ def images(copd, people):
     show("CT of others, without air", [airless(a, b) for a, b in itertools.permutations(full, 2)])
 
 
+def values(maps):
+    """Show how many different values label maps and real slices have."""
+    show("label maps, different values", [len(np.unique(np.asanyarray(nibabel.load(path).dataobj))) for path in maps])
+    folder = os.path.join(os.path.dirname(pydicom.__file__), "data/test_files")
+    show("slices of CT, MR and scintigraphy, different values",
+         [len(np.unique(pydicom.dcmread(f"{folder}/{name}.dcm").pixel_array)) for name in SLICES])
+
+
 def main(build, copd, *lobes):
     supine, copd = os.path.abspath(os.path.join(build, "supine")), os.path.abspath(copd)
     people = sorted({os.path.basename(path)[:6] for path in glob.glob(copd + "/case*_insp.nii.gz")})
@@ -104,6 +115,7 @@ def main(build, copd, *lobes):
         contents(supine, [(f"{copd}/{p}_insp.nii.gz", "1", ()) for p in people] +
                  [(path, "all", ("--labels", "lobes")) for path in lobes])
         images(copd, people)
+    values([*glob.glob(copd + "/*.nii.gz"), *lobes])
 
 
 if __name__ == "__main__":

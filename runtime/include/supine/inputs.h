@@ -57,6 +57,7 @@ typedef enum supine_input_id {
   /* Images that move with the lungs. */
   SUPINE_INPUT_IMAGE_FRAME,
   SUPINE_INPUT_CT_FRAME,
+  SUPINE_INPUT_IMAGE_LABELS,
   SUPINE_INPUT_CT_AIR,
   SUPINE_INPUT_CT_SOFT,
   /* Two scans of one person, in one posture. */
