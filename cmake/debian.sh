@@ -20,7 +20,7 @@ quick="g++ libegl-dev libgles-dev libgl1-mesa-dri libcmocka-dev libopenigtlink-d
   python3-yaml python3-numpy python3-nibabel python3-pip python3-setuptools python3-wheel"
 all="poppler-utils locales python3-vtk9 plastimatch elastix tetgen calculix-ccx reuse abigail-tools
   clang lld wasi-libc libclang-rt-dev-wasm32 binaryen gcc-aarch64-linux-gnu libc6-dev-arm64-cross doxygen
-  cmark-gfm dcmtk python3-pydicom"
+  cmark-gfm dcmtk python3-pydicom zsh fish"
 platforms="clang musl-tools gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user gcc-mingw-w64-x86-64-win32 wine64 wine"
 
 install_missing() {

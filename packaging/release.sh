@@ -112,7 +112,7 @@ strip -o "$work/stage/all/bin/supine" build/package/supine
 top=$work/stage/$name
 mkdir -p "$top/bin" "$top/lib" "$top/share/doc/supine/libraries"
 cp "$work/stage/all/bin/supine" "$top/bin"
-cp -r "$work/stage/all/share/man" "$work/stage/all/share/bash-completion" "$top/share"
+(cd "$work/stage/all/share" && cp -r man bash-completion fish zsh "$top/share")
 cp README.md CHANGELOG.md LICENSE LICENSES/* "$top/share/doc/supine"
 strings "$top/bin/supine" | grep -x 'lib[a-z0-9_.-]*\.so\.[0-9a-z.]*' | sort -u | while read -r library; do
   ldconfig -p | awk -v name="$library" '$1 == name { print $NF; exit }'

@@ -1,9 +1,12 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Check manual pages and completions, made from the tables of options: test_manual.sh PROGRAM FOLDER
+# Shells that are not installed are left out.
 set -u
 supine=$1
+tests=$(cd "$(dirname "$0")" && pwd)
 cd "$2" || exit 1
+manual=$PWD
 failures=0
 fail() {
   echo "FAILED: $*"
@@ -13,42 +16,64 @@ fail() {
 commands=$("$supine" --help | sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(echo "$commands" | wc -w)" -ge 11 ] || fail "commands: $commands"
 
-# Every option of --help-all is in the manual page of its command and in the completion.
+# Every option of --help-all is in the manual page of its command and in the completions.
 for command in $commands; do
-  for option in $("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*'); do
-    sed 's/\\-/-/g' "supine-$command.1" | grep -q -- "$option" || fail "supine-$command.1 lacks $option"
-    grep "^  $command) words=" supine.bash | grep -q -- "$option " || fail "supine.bash: $command lacks $option"
-  done
+  options=$("$supine" "$command" --help-all | grep -oE '^  (-[a-z], )?--[a-z-]+' | grep -oE -- '--.*' | sort -u)
+  [ -n "$options" ] || fail "$command has no options"
+  # holds FILE: report the options that are not in the list on standard input.
+  holds() {
+    lacks=$(comm -23 <(echo "$options") <(sort -u))
+    [ -z "$lacks" ] || fail "$1: $command lacks" $lacks
+  }
+  holds "supine-$command.1" < <(sed 's/\\-/-/g' "supine-$command.1" | grep -oE -- '--[a-z-]+')
+  holds supine.bash < <(grep "^  $command) words=" supine.bash | grep -oE -- '--[a-z-]+')
+  holds _supine < <(sed -n "/^$command)/,/;;/s/.*\(--[a-z-]*\)}\{0,1\}'\[.*/\1/p" _supine)
+  holds supine.fish < <(sed -n "s/.*command $command' -l \([a-z-]*\) .*/--\1/p" supine.fish)
   if command -v groff >/dev/null; then
     warnings=$(groff -man -Tutf8 -ww -z "supine-$command.1" 2>&1)
     [ -z "$warnings" ] || fail "supine-$command.1: $warnings"
   fi
 done
 
-. ./supine.bash
-# complete_words WORDS...: print bash's completions of the last word.
-complete_words() {
-  COMP_WORDS=(supine "$@")
-  COMP_CWORD=$#
-  COMPREPLY=()
-  _supine
-  echo "${COMPREPLY[*]}"
+# Completions of the last word of a line.
+lines="supine def
+supine deform lungs.safetensors --pos
+supine deform lungs.safetensors --posture pr
+supine precompute --law p
+supine precompute lu
+supine precompute -o lu
+supine precompute --fields lu
+supine info --help-"
+wanted="deform
+--posture
+prone
+paper
+lungs.ply
+lungs.ply
+lungs.ply
+--help-all"
+complete_bash() {
+  . "$manual/supine.bash"
+  while read -ra COMP_WORDS; do
+    COMP_CWORD=$((${#COMP_WORDS[@]} - 1)) COMPREPLY=()
+    _supine
+    echo "${COMPREPLY[*]}"
+  done
 }
-expect() {
-  wanted=$1
-  shift
-  got=$(complete_words "$@")
-  [ "$got" = "$wanted" ] || fail "$*: '$got', not '$wanted'"
+complete_zsh() {
+  zsh -f "$tests/complete.zsh" "$manual"
 }
-expect "deform" def
-expect "--posture" deform lungs.safetensors --pos
-expect "prone" deform lungs.safetensors --posture pr
-expect "paper" precompute --law p
-expect "" precompute --band 3
+complete_fish() {
+  fish --no-config -c 'source $argv; while read line; complete -C $line | cut -f 1 | string join " "; end' "$manual/supine.fish"
+}
 cd "$(mktemp -d)" && : >lungs.ply
-expect "lungs.ply" precompute lu
-expect "lungs.ply" precompute -o lu
-expect "lungs.ply" precompute --fields lu
+for shell in bash zsh fish; do
+  command -v $shell >/dev/null || continue
+  got=$(echo "$lines" | complete_$shell)
+  [ "$got" = "$wanted" ] || fail "$shell completes" $got
+  got=$([ $shell = zsh ] || echo "supine precompute --band 3" | complete_$shell)
+  [ -z "$got" ] || fail "$shell completes a number: $got"
+done
 rm -r "$PWD"
-cd "$2" || exit 1
+cd "$manual" || exit 1
 [ $failures -eq 0 ] || exit 1
