@@ -61,8 +61,8 @@ void supine_output_abandon_all(void) {
 
 static supine_status output_fail(supine_output *output, supine_error *error, const char *what) {
   const int code = errno;
-  (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", output->path, what,
-                         strerror(code));
+  const char *const name = output->standard ? "standard output" : output->path;
+  (void)supine_error_set(error, SUPINE_ERROR_WRITE, "%s: %s: %s", name, what, strerror(code));
   supine_output_abandon(output);
   return SUPINE_ERROR_WRITE;
 }

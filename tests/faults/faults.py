@@ -171,6 +171,22 @@ def faultless(trial, arguments):
     return {kind: (run[0], run[1] if same else None, *run[2:]) for kind, run in runs.items()}
 
 
+def unnamed(trial, line):
+    """Return what is wrong with the messages of a command whose outputs cannot be written: the folder is missing, is a
+    file, or the disk is full. They must name the output as it was given."""
+    found = []
+    for name in re.findall(r"out/\S+", line):
+        for kind, given in (("no folder", "missing/" + name), ("a file", "lungs.ply/" + name), ("full disk", "full")):
+            if kind == "full disk":
+                given = "full" + Path(name).suffix
+                (trial.folder / given).unlink(missing_ok=True)
+                (trial.folder / given).symlink_to("/dev/full")
+            code, _, words, _ = trial.run([given if word == name else word for word in line.split()])
+            if code not in (3, 4) or f": {given}: cannot write: " not in words and code == 4:
+                found.append(f"{line}: {kind}: {code}, {words.strip()!r}")
+    return found
+
+
 def samples(folder):
     """Write the input files that the commands in BEFORE do not make."""
     (folder / "points.csv").write_text("name,x,y,z\ncarina,60,-180,-60\nnodule,-80,-120,-90\n")
@@ -228,6 +244,7 @@ def main():
         write_fields(trial.folder)
         kept = trial.folder / "kept"
         for line in filter(lambda text: text and word in text, COMMANDS.split("\n")):
+            wrong += unnamed(trial, line)
             if library is None:
                 code, _, words, _ = trial.run(line.split())
                 print(f"{code}: {line}" if code == 0 else f"WRONG {code}: {line}: {words}", flush=True)
