@@ -63,6 +63,32 @@ static inline void supine_quaternion_matrix(const double quaternion[4], double m
   }
 }
 
+/** Deviation from a rotation that rounding causes: to 32-bit floats 1e-6, in trackers 1e-4. */
+#define SUPINE_ROTATION_TOLERANCE 1e-3
+
+/** Return how much a matrix R, row by row, is stretched or sheared beyond a uniform scale, which is
+ * negative if R has a reflection:
+ *
+ *     max |(R^T R)_ij / scale^2 - delta_ij| / 2,    |scale| = sqrt(trace(R^T R) / 3)
+ *
+ * A rotation has scale 1 and strain 0. The strain means nothing if the scale is 0 or not finite. */
+static inline double supine_matrix_strain(const double matrix[9], double *scale) {
+  double square = 0;
+  for (int i = 0; i < 9; ++i) {
+    square += matrix[i] * matrix[i] / 3;
+  }
+  double strain = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      const double product =
+          matrix[i] * matrix[j] + matrix[3 + i] * matrix[3 + j] + matrix[6 + i] * matrix[6 + j];
+      strain = fmax(strain, 0.5 * fabs(product / square - (i == j ? 1 : 0)));
+    }
+  }
+  *scale = copysign(sqrt(square), supine_triple(matrix, matrix + 3, matrix + 6));
+  return strain;
+}
+
 static inline double supine_distance(const double a[3], const double b[3]) {
   double d[3];
   supine_subtract(a, b, d);

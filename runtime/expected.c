@@ -83,8 +83,12 @@ static double mean_square_of_lungs(const supine_basis *basis, const supine_pose 
 supine_volume_kind supine_expected_assumed(const supine_basis *basis) {
   const char *scanned = supine_basis_metadata(basis, "scanned");
   const char *state = supine_basis_metadata(basis, "scan_state");
-  const bool at_rest = (scanned != NULL && strcmp(scanned, "rest") == 0) ||
-                       (state != NULL && strstr(state, "rest") != NULL);
+  supine_state scan = {0};
+  if (state != NULL) {
+    (void)supine_state_parse(state, &scan, NULL);
+  }
+  const bool at_rest =
+      (scanned != NULL && strcmp(scanned, "rest") == 0) || scan.volume.kind == SUPINE_VOLUME_REST;
   if (!supine_basis_get_info(basis)->has_rest ||
       supine_basis_metadata(basis, "resting_known") != NULL) {
     return SUPINE_VOLUME_DEFAULT;

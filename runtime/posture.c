@@ -2,11 +2,14 @@
 /* Find the direction of gravity in a posture, an orientation, a tilt or a roll. */
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <supine/inputs.h>
 #include <supine/posture.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/words.h"
 
@@ -71,27 +74,71 @@ const char *supine_posture_nearest(const char *name) {
   return best;
 }
 
-supine_status supine_posture_quaternion(const double quaternion[4], double gravity[3]) {
-  double largest = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (!isfinite(quaternion[i])) {
-      return SUPINE_ERROR_ARGUMENT;
-    }
-    largest = fmax(largest, fabs(quaternion[i]));
+/* Which of its own axes (1, 2, 3 for x, y, z, negative for the opposite direction) point to the
+ * left, the back and the head of a body that is standing. */
+static const struct {
+  const char *name;
+  signed char left, back, head;
+} bodies[] = {{"lps", 1, 2, 3},
+              {"unity", -1, -3, 2},
+              {"unreal", -2, -1, 3},
+              {"three", 1, -3, 2},
+              {"headset", -1, 3, 2}};
+
+enum { BODIES = sizeof bodies / sizeof *bodies };
+
+static supine_status refuse_body(const char *name, supine_error *error) {
+  char known[64] = "";
+  size_t length = 0;
+  for (size_t i = 0; i < BODIES; ++i) {
+    length += (size_t)snprintf(known + length, sizeof known - length, " %s", bodies[i].name);
   }
-  if (largest == 0) {
-    return SUPINE_ERROR_ARGUMENT;
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "no axes '%s': give one of%s", name, known);
+}
+
+/* Check that the `count` numbers are a rotation, and convert it to a matrix. */
+static supine_status read_rotation(const double *rotation, size_t count, double matrix[9],
+                                   supine_error *error) {
+  SUPINE_REFUSE_IF(count != 4 && count != 9, error, SUPINE_ERROR_ARGUMENT,
+                   "%zu numbers: give a quaternion of 4 or a matrix of 9", count);
+  if (count == 4) {
+    supine_quaternion_matrix(rotation, matrix);
+  } else {
+    memcpy(matrix, rotation, 9 * sizeof *matrix);
   }
-  double q[4];
-  double rotation[9]; /* scaled; in body axes, (0, 0, -1) of world axes is minus its third row */
-  for (int i = 0; i < 4; ++i) {
-    q[i] = quaternion[i] / largest;
+  double scale = 0;
+  const double strain = supine_matrix_strain(matrix, &scale);
+  SUPINE_REFUSE_IF(!(strain <= SUPINE_ROTATION_TOLERANCE) ||
+                       !(fabs(scale - 1) <= SUPINE_ROTATION_TOLERANCE),
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "not a rotation: scale %.4g instead of 1%s, shear %.4g instead of 0. Normalise "
+                   "the quaternion, or give the matrix without its scale",
+                   scale, scale < 0 ? " (mirrored)" : "", strain);
+  return SUPINE_OK;
+}
+
+supine_status supine_posture_rotation(const double *rotation, size_t count, const double up[3],
+                                      const char *axes, double gravity[3], supine_error *error) {
+  size_t body = 0;
+  while (body < BODIES && !supine_words_same(axes, bodies[body].name)) {
+    ++body;
   }
-  supine_quaternion_matrix(q, rotation);
-  const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  if (body == BODIES) {
+    return refuse_body(axes, error);
+  }
+  double matrix[9];
+  double high[3];
+  SUPINE_TRY(read_rotation(rotation, count, matrix, error));
+  const bool has_up = supine_normalise(up, high);
+  SUPINE_REFUSE_IF(!has_up, error, SUPINE_ERROR_ARGUMENT,
+                   "up is zero or not finite: give a direction");
+  const signed char axis[3] = {bodies[body].left, bodies[body].back, bodies[body].head};
   for (int i = 0; i < 3; ++i) {
-    gravity[i] = (0 - rotation[6 + i]) / square;
+    const int k = abs(axis[i]) - 1;
+    const double along = matrix[k] * high[0] + matrix[3 + k] * high[1] + matrix[6 + k] * high[2];
+    gravity[i] = axis[i] > 0 ? 0 - along : along;
   }
+  (void)supine_normalise(gravity, gravity); /* the rotation may be rounded */
   return SUPINE_OK;
 }
 

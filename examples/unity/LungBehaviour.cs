@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: MIT
-// Shows the lungs in a Unity scene. Add this script to an object with a MeshFilter, and set the basis file
-// and the server of 'supine stream'. The object is the patient: its rotation is sent to the server whenever
-// it changes. Unity's axes are left-handed, in metres, y up. An object without rotation is a standing
-// patient who faces +z, with left, back and head at -x, -z and +y.
+// Shows the lungs in a Unity scene. Add this script to an object with a MeshFilter, and set the basis file.
+// The object is the patient: the lungs deform whenever its rotation changes. Set a host to follow 'supine
+// stream' there, to which the rotation is sent; without one, everything is computed here. Unity's axes are
+// left-handed, in metres, y up. An object without rotation is a standing patient who faces +z, with left,
+// back and head at -x, -z and +y.
 using UnityEngine;
 using UnityEngine.Rendering;
 
 public class LungBehaviour : MonoBehaviour
 {
     public string basisFile = "lungs.safetensors";
-    public string host = "localhost";
+    public string volume = "rest+500"; // without a host
+    public string host = "";
     public int port = 18944;
     Supine.Basis basis;
     Supine.Link link;
-    float[] xyz;
-    Vector3[] positions;
+    float[] xyz, normals;
+    Vector3[] points, directions;
     Mesh mesh;
     ulong sent;
 
-    public static Vector3 ToUnity(float left, float back, float head)
+    static readonly double[] up = { 0, 1, 0 };
+
+    public static Vector3 ToUnity(float left, float back, float head, float scale)
     {
-        return new Vector3(-1e-3f * left, 1e-3f * head, -1e-3f * back);
+        return new Vector3(-scale * left, scale * head, -scale * back);
     }
 
     /// <summary>Reverses triangles in place, so that they face outwards in left-handed axes.</summary>
@@ -53,38 +57,51 @@ public class LungBehaviour : MonoBehaviour
     void Start()
     {
         basis = new Supine.Basis(basisFile);
-        link = new Supine.Link(host, port);
-        xyz = basis.Vertices();
-        positions = new Vector3[basis.VertexCount];
+        if (host != "") link = new Supine.Link(host, port);
+        xyz = new float[3 * basis.VertexCount];
+        normals = new float[3 * basis.VertexCount];
+        points = new Vector3[basis.VertexCount];
+        directions = new Vector3[basis.VertexCount];
         mesh = new Mesh();
         mesh.indexFormat = IndexFormat.UInt32;
         mesh.MarkDynamic();
-        Show();
+        Show(); // the surface of the file, before the first pose
         mesh.triangles = ToUnity(basis.Triangles());
-        mesh.RecalculateNormals();
         GetComponent<MeshFilter>().mesh = mesh;
+        transform.hasChanged = true;
     }
 
     void Update()
     {
-        if (transform.hasChanged)
+        bool turned = transform.hasChanged;
+        transform.hasChanged = false;
+        if (link == null)
         {
-            link.SendPose("Patient", Pose(transform.rotation), ++sent);
-            transform.hasChanged = false;
+            if (!turned) return;
+            Quaternion q = transform.rotation;
+            basis.Pose(basis.Gravity(new double[] { q.w, q.x, q.y, q.z }, up, "unity"), volume);
         }
-        ulong stamp;
-        float[] frame = link.TakeNewest(out stamp);
-        if (frame == null) return;
-        basis.Deform(frame, xyz);
+        else
+        {
+            if (turned) link.SendPose("Patient", Pose(transform.rotation), ++sent);
+            ulong stamp;
+            float[] frame = link.TakeNewest(out stamp);
+            if (frame == null) return;
+            basis.Pose(frame);
+        }
         Show();
-        mesh.RecalculateNormals();
     }
 
     void Show()
     {
-        for (int i = 0; i < positions.Length; ++i)
-            positions[i] = ToUnity(xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]);
-        mesh.vertices = positions;
+        basis.Deform(xyz, normals);
+        for (int i = 0; i < points.Length; ++i)
+        {
+            points[i] = ToUnity(xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2], 1e-3f);
+            directions[i] = ToUnity(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2], 1);
+        }
+        mesh.vertices = points;
+        mesh.normals = directions;
     }
 
     void OnDestroy()

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A peer of 'supine stream' for Unity, in one file that needs only .NET. Link exchanges OpenIGTLink
-// messages with the server; its thread keeps the newest frame. Basis calls the run-time library by
-// P/Invoke. LungBehaviour.cs uses both in a scene.
+// Lungs for Unity, in one file that needs only .NET. Basis calls the run-time library by P/Invoke. Link
+// exchanges OpenIGTLink messages with 'supine stream'; its thread keeps the newest frame.
+// LungBehaviour.cs uses both in a scene.
 using System;
 using System.Net.Sockets;
 using System.Runtime.InteropServices;
@@ -191,9 +191,12 @@ namespace Supine
         [DllImport(Library)] static extern IntPtr supine_basis_vertices(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_triangles(IntPtr basis);
         [DllImport(Library)] static extern IntPtr supine_basis_tensor(IntPtr basis, string name);
-        [DllImport(Library)] static extern int supine_state_parse(string text, byte[] state, IntPtr error);
-        [DllImport(Library)] static extern int supine_basis_pose(IntPtr basis, byte[] state, double[] pose, IntPtr error);
-        [DllImport(Library)] static extern int supine_deform(IntPtr basis, double[] pose, float[] xyz);
+        [DllImport(Library)] static extern int supine_state_parse(string text, byte[] state, byte[] error);
+        [DllImport(Library)] static extern int supine_state_parse_volume(string text, byte[] state, byte[] error);
+        [DllImport(Library)] static extern int supine_posture_rotation(
+            double[] rotation, UIntPtr count, double[] up, string axes, double[] gravity, byte[] error);
+        [DllImport(Library)] static extern int supine_basis_pose(IntPtr b, byte[] state, double[] pose, byte[] error);
+        [DllImport(Library)] static extern int supine_deform_lit(IntPtr b, double[] pose, float[] xyz, float[] n);
 
         [StructLayout(LayoutKind.Sequential)]
         struct Info // the beginning of supine_basis_info
@@ -210,10 +213,11 @@ namespace Supine
             public IntPtr Data;
         }
 
-        const int StateSize = 112; // sizeof(supine_state)
+        const int StateSize = 112, ErrorSize = 688; // sizeof(supine_state), sizeof(supine_error)
         const int ModesMax = 256, LungsMax = 16;
         IntPtr handle;
         readonly int weights, lungs; // number of weights: one of each mode or, in fields over volume, of each lung and mode
+        readonly byte[] state = new byte[StateSize], error = new byte[ErrorSize];
         readonly double[] pose = new double[ModesMax + 4 * LungsMax + 1]; // supine_pose: weights, gains, basis, expansions
 
         public Basis(string path)
@@ -231,25 +235,55 @@ namespace Supine
         public int VertexCount { get; private set; }
         public int TriangleCount { get; private set; }
 
-        /// <summary>Computes the positions [3 N] of the vertices from a received frame, mm, LPS.</summary>
-        public void Deform(float[] frame, float[] xyz)
+        /// <summary>Computes gravity in body axes, as supine_posture_rotation does.</summary>
+        public double[] Gravity(double[] rotation, double[] up, string axes)
         {
-            if (frame.Length != weights + 3 * lungs || xyz.Length != 3 * VertexCount)
+            double[] gravity = new double[3];
+            Check(supine_posture_rotation(rotation, (UIntPtr)rotation.Length, up, axes, gravity, error));
+            return gravity;
+        }
+
+        /// <summary>Poses the lungs for gravity in body axes and a volume such as "rest+500".</summary>
+        public void Pose(double[] gravity, string volume)
+        {
+            Array.Clear(state, 0, StateSize);
+            Buffer.BlockCopy(gravity, 0, state, 0, 3 * sizeof(double)); // the first member of a supine_state
+            Check(supine_state_parse_volume(volume, state, error));
+            Check(supine_basis_pose(handle, state, pose, error));
+        }
+
+        /// <summary>Poses the lungs as a received frame says.</summary>
+        public void Pose(float[] frame)
+        {
+            if (frame.Length != weights + 3 * lungs)
                 throw new ArgumentException("the frame belongs to another basis: open the basis file of the server");
             for (int i = 0; i < frame.Length; ++i) pose[PoseIndex(i)] = frame[i];
-            if (supine_deform(handle, pose, xyz) != 0) throw new ArgumentException("the pose is of another basis");
+        }
+
+        /// <summary>Computes positions, mm, and unit normals of the vertices in the pose, both [3 N], LPS.</summary>
+        public void Deform(float[] xyz, float[] normals)
+        {
+            if (xyz.Length != 3 * VertexCount || normals.Length != 3 * VertexCount)
+                throw new ArgumentException("give arrays of " + 3 * VertexCount + " numbers");
+            if (supine_deform_lit(handle, pose, xyz, normals) != 0)
+                throw new ArgumentException("the pose is of another basis");
         }
 
         /// <summary>Computes a frame, as the server would send it, from a state such as "left:rest+500".</summary>
         public float[] Frame(string text)
         {
-            byte[] state = new byte[StateSize];
-            if (supine_state_parse(text, state, IntPtr.Zero) != 0 ||
-                supine_basis_pose(handle, state, pose, IntPtr.Zero) != 0)
-                throw new ArgumentException(text + ": not a state that this basis can show");
+            Array.Clear(state, 0, StateSize);
+            Check(supine_state_parse(text, state, error));
+            Check(supine_basis_pose(handle, state, pose, error));
             float[] frame = new float[weights + 3 * lungs];
             for (int i = 0; i < frame.Length; ++i) frame[i] = (float)pose[PoseIndex(i)];
             return frame;
+        }
+
+        // Throws the message of the library, which follows its status, if there is one.
+        void Check(int status)
+        {
+            if (status != 0) throw new ArgumentException(Encoding.UTF8.GetString(error, 4, 512).Split('\0')[0]);
         }
 
         // Returns the index in `pose` of the i-th number of a frame.

@@ -7,9 +7,6 @@
 
 #include "program/stream/gravity.h"
 
-/* A matrix that deviates from a rotation by at most this counts as exact. Rounding to 32-bit floats
- * causes deviations of 1e-6, the arithmetic of trackers up to about 1e-4. */
-static const double exact_max = 1e-3;
 static const double repaired_max = 0.1; /* a matrix with more stretch or shear is refused */
 
 supine_stream_setup supine_stream_setup_default(void) {
@@ -26,26 +23,18 @@ static void apply_transpose(const double m[9], const double v[3], double out[3])
 supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *setup,
                                                      const double rotation[9], double gravity[3],
                                                      const char **why) {
-  double product[9]; /* R^T R, where R is `rotation` */
-  for (int i = 0; i < 3; ++i) {
-    const double column[3] = {rotation[i], rotation[3 + i], rotation[6 + i]};
-    apply_transpose(rotation, column, product + 3 * i);
-  }
-  const double squared_scale = (product[0] + product[4] + product[8]) / 3.0;
+  double scale = 0.0;
+  const double strain = supine_matrix_strain(rotation, &scale);
   *why = "its matrix is zero or not finite; send a rotation";
-  if (!(squared_scale > 1e-12) || !isfinite(squared_scale)) {
+  if (!(fabs(scale) > 1e-6) || !isfinite(scale)) {
     return SUPINE_STREAM_REFUSED;
-  }
-  double strain = 0.0;
-  for (int i = 0; i < 9; ++i) {
-    strain = fmax(strain, 0.5 * fabs(product[i] / squared_scale - (i % 4 == 0 ? 1.0 : 0.0)));
   }
   *why = "its matrix has stretch or shear; send a rotation";
   if (!(strain <= repaired_max)) {
     return SUPINE_STREAM_REFUSED;
   }
   *why = "its matrix has a reflection; send a rotation";
-  if (supine_triple(rotation, rotation + 3, rotation + 6) < 0.0) {
+  if (scale < 0.0) {
     return SUPINE_STREAM_REFUSED;
   }
   double tracker_down[3];
@@ -53,10 +42,11 @@ supine_stream_verdict supine_stream_gravity_rotation(const supine_stream_setup *
   const supine_stream_verdict verdict =
       supine_stream_gravity_down(setup, tracker_down, gravity, why);
   if (verdict != SUPINE_STREAM_EXACT ||
-      (strain <= exact_max && fabs(sqrt(squared_scale) - 1.0) <= exact_max)) {
+      (strain <= SUPINE_ROTATION_TOLERANCE && fabs(scale - 1.0) <= SUPINE_ROTATION_TOLERANCE)) {
     return verdict;
   }
-  *why = strain <= exact_max ? "its scale is not 1" : "its matrix has slight stretch or shear";
+  *why = strain <= SUPINE_ROTATION_TOLERANCE ? "its scale is not 1"
+                                             : "its matrix has slight stretch or shear";
   return SUPINE_STREAM_REPAIRED;
 }
 

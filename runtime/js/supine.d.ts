@@ -83,6 +83,14 @@ export interface Basis {
   /** Set the pose to that of the scan. For fields of another simulator it is the given surface.
    * @throws SupineError */
   poseScan(): this;
+  /** Compute gravity, for a state, for a body that an engine or a headset has rotated.
+   * @param rotation  from the axes of the body's object to those of the world: a unit quaternion W, X, Y, Z, or a matrix
+   * of 9 numbers, row by row
+   * @param up  direction in the world that points up, such as [0, 1, 0]
+   * @param axes  axes of the object: lps (default), unity, unreal, three or headset; supine_posture_rotation in C says
+   * where each has the patient's left, back and head
+   * @throws SupineError */
+  gravityOfRotation(rotation: ArrayLike<number>, up: ArrayLike<number>, axes?: string): number[];
   /** Compute the position of one vertex in the pose, mm. */
   at(vertex: number): number[];
   /** The uniforms supine_weights and supine_gains of supine.glsl in the pose. Throws if the basis has clusters. */

@@ -224,6 +224,17 @@ class Basis {
     memory.copyWithin(this.#state, this.#nextState, this.#nextState + STATE + POSE);
   }
 
+  gravityOfRotation(rotation, up, axes = 'lps') {
+    const [turn, high] = [Array.from(rotation, (x) => number(x, 'rotation')), Array.from(up, (x) => number(x, 'up'))];
+    if (high.length !== 3) throw refusal('up must be three numbers');
+    this.#view(Float64Array, this.#nextPose, 9).set(turn.slice(0, 9));
+    this.#view(Float64Array, this.#volumes, 3).set(high);
+    const { supine_posture_rotation: find } = this.#c;
+    const name = this.#write(axes);
+    this.#check(find(this.#nextPose, turn.length, this.#volumes, name, this.#nextState, this.#error));
+    return Array.from(this.#view(Float64Array, this.#nextState, 3));
+  }
+
   at(vertex) {
     const status = this.#c.supine_deform_range(this.#basis, this.#pose, vertex, vertex + 1, this.#text);
     this.#check(status, `vertex ${vertex} is not one of 0 to ${this.vertexCount - 1}, or the pose is not finite`);

@@ -174,6 +174,42 @@ for (const gain of [NaN, Infinity])
   assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
 assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
 
+/* Gravity from a rotation: of three.js's objects, which face +z, and cameras, which face -z. */
+const { Matrix3, Object3D, PerspectiveCamera } = loadCommon('three');
+const aimed = (object, top, target) => {
+  object.up.set(...top);
+  object.lookAt(...target);
+  object.updateMatrixWorld();
+  const { w, x, y, z } = object.quaternion;
+  return [[w, x, y, z], new Matrix3().setFromMatrix4(object.matrixWorld).transpose().elements];
+};
+for (const [axes, top, target, gravity] of [
+  ['three', [0, 1, 0], [3, 0, 4], [0, 0, -1]], // upright, turned about the vertical
+  ['three', [0, 0, -1], [0, 1, 0], [0, 1, 0]], // faces up: on the back
+  ['three', [0, 0, 1], [0, -1, 0], [0, -1, 0]],
+  ['three', [1, 0, 0], [0, 0, 1], [1, 0, 0]], // the head points to +x; left = head x front = x x z = -y is below
+  ['headset', [0, 1, 0], [0, 0, -1], [0, 0, -1]],
+  ['headset', [0, 0, 1], [0, 1, 0], [0, 1, 0]],
+  ['headset', [1, 0, 0], [0, 0, -1], [-1, 0, 0]], // left = x x (-z) = y is above
+]) {
+  const object = axes === 'three' ? new Object3D() : new PerspectiveCamera();
+  for (const rotation of aimed(object, top, target)) {
+    const found = lungs.gravityOfRotation(rotation, [0, 1, 0], axes);
+    assert.ok(largestDistance(found, gravity) < 1e-6, `${axes} ${top} ${target}: ${found}`);
+  }
+}
+assert.deepEqual(lungs.gravityOfRotation([1, 0, 0, 0], [0, 0, 1]), [0, 0, -1]);
+for (const [rotation, up, axes, words] of [
+  [[1, 1, 0, 0], [0, 1, 0], 'unity', /scale 2 instead of 1.*Normalise/],
+  [[-1, 0, 0, 0, 1, 0, 0, 0, 1], [0, 1, 0], 'unity', /mirrored/],
+  [[NaN, 0, 0, 0], [0, 1, 0], 'unity', /rotation is NaN/],
+  [new Float32Array(16), [0, 1, 0], 'unity', /16 numbers: give a quaternion of 4 or a matrix of 9/],
+  [[1, 0, 0, 0], [0, 1], 'unity', /up must be three numbers/],
+  [[1, 0, 0, 0], [0, 1, 0], 'godot', /give one of lps unity unreal three headset/],
+]) {
+  assert.throws(() => lungs.gravityOfRotation(rotation, up, axes), { status: 'argument', message: words });
+}
+
 /* The targets are the rows of 'supine deform': a row for each name, also of a mesh. */
 const [parts, table] = [await open(readFileSync(inside)), join(folder, 'targets.csv')];
 for (const [since, from] of [

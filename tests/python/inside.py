@@ -137,10 +137,16 @@ refused(supine.ArgumentError, "made by another basis", lungs.volumes, other)
 grid = supine.open("grid.safetensors")
 assert (grid.deform(pose) == grid.deform(grid.pose(STATE))).all()
 
-# The direction of gravity can be given as a name, a tilt or a quaternion.
+# The direction of gravity can be given as a name, a tilt or a rotation.
 assert tuple(supine.gravity("HFP")) == (0.0, -1.0, 0.0) and "prone" in supine.postures()
 assert np.allclose(supine.tilt("supine", 90), (0, 0, 1))
-assert np.allclose(supine.gravity_of_quaternion((1, 0, 0, 0)), supine.gravity("upright"))
+assert np.allclose(supine.gravity_of_rotation((1, 0, 0, 0), (0, 0, 1)), supine.gravity("upright"))
+back = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]  # a Unity object that faced +z, and now lies on its back
+assert np.allclose(supine.gravity_of_rotation(back, (0, 1, 0), "unity"), supine.gravity("supine"))
+refused(supine.ArgumentError, "mirrored", supine.gravity_of_rotation, np.diag((1, 1, -1)), (0, 1, 0), "unity")
+refused(supine.ArgumentError, "Normalise", supine.gravity_of_rotation, (1, 1, 0, 0), (0, 1, 0), "unity")
+refused(supine.ArgumentError, "not finite", supine.gravity_of_rotation, (np.nan, 1, 0, 0), (0, 1, 0))
+refused(supine.ArgumentError, "give one of lps unity", supine.gravity_of_rotation, (1, 0, 0, 0), (0, 1, 0), "blender")
 
 # supine.breath computes the volume inhaled at each time of a breath.
 times = np.array([[0, 5 / 3], [5, 2]])

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test directions of gravity from names of postures, quaternions and tilts. */
+/* Test directions of gravity from names of postures, rotations and tilts. */
 #include <float.h>
 
 #include "tests/helpers/test.h"
 
 #include <supine/posture.h>
+
+#include "base/vec3.h"
 
 #include "tests/helpers/runtime_fixture.h"
 
@@ -90,25 +92,59 @@ TEST(test_nearest_misspelling_gives_name) {
   assert_null(supine_posture_nearest(text));
 }
 
-TEST(test_quaternion_known_orientations_literal) {
+/* Directions computed by hand, for an object that stands, faces forward without rotation, and then
+ * is turned by 90 degrees. In Unreal Engine, FRotator(pitch 90) has the quaternion (h, 0, -h, 0),
+ * and FRotator(roll 90), which lowers the right side, (h, -h, 0, 0). */
+TEST(test_rotation_of_engines_literal) {
   const double h = sqrt(0.5);
-  double g[3];
-  assert_int_equal(supine_posture_quaternion((double[]){1, 0, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* upright: the axes of body and world are equal */
-  assert_false(signbit(g[0]) || signbit(g[1]));
-  /* Prone: after a rotation by +90 degrees about x, the back (y of the body) points up (z of the
-   * world). */
-  assert_int_equal(supine_posture_quaternion((double[]){h, h, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, -1, 0);
-  assert_int_equal(supine_posture_quaternion((double[]){-3 * h, 3 * h, 0, 0}, g), SUPINE_OK);
-  /* Supine: -90 degrees about x. Sign and length of the quaternion do not matter. */
-  assert_vector(g, 0, 1, 0);
-  /* On the left side: +90 degrees about y rotates the head (z of the body) to x of the world, and
-   * left (x) to -z. */
-  assert_int_equal(supine_posture_quaternion((double[]){h, 0, h, 0}, g), SUPINE_OK);
-  assert_vector(g, 1, 0, 0);
-  assert_int_equal(supine_posture_quaternion((double[]){h, 0, 0, h}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1); /* a turn about the body's axis z: still upright */
+  const struct {
+    const char *axes;
+    double up[3];
+    double rotation[4]; /* W, X, Y, Z */
+    double gravity[3];
+  } cases[] = {
+      {"lps", {0, 0, 1}, {1, 0, 0, 0}, {0, 0, -1}},
+      {"lps", {0, 0, 1}, {h, -h, 0, 0}, {0, 1, 0}},
+      {"lps", {0, 0, 1}, {h, h, 0, 0}, {0, -1, 0}},
+      {"lps", {0, 0, 1}, {h, 0, h, 0}, {1, 0, 0}},
+      {"lps", {0, 0, 1}, {-h, h, 0, 0}, {0, 1, 0}},
+      {"lps", {0, 0, 1}, {h, 0, 0, h}, {0, 0, -1}},
+      {"unity", {0, 1, 0}, {1, 0, 0, 0}, {0, 0, -1}},
+      {"unity", {0, 1, 0}, {h, -h, 0, 0}, {0, 1, 0}},
+      {"unity", {0, 1, 0}, {h, h, 0, 0}, {0, -1, 0}},
+      {"unity", {0, 1, 0}, {h, 0, 0, h}, {1, 0, 0}},
+      {"unity", {0, 1, 0}, {h, 0, 0, -h}, {-1, 0, 0}},
+      {"unity", {0, 1, 0}, {h, 0, h, 0}, {0, 0, -1}},
+      {"Unreal", {0, 0, 1}, {1, 0, 0, 0}, {0, 0, -1}},
+      {"Unreal", {0, 0, 1}, {h, 0, -h, 0}, {0, 1, 0}},
+      {"Unreal", {0, 0, 1}, {h, 0, h, 0}, {0, -1, 0}},
+      {"Unreal", {0, 0, 1}, {h, h, 0, 0}, {1, 0, 0}},
+      {"Unreal", {0, 0, 1}, {h, -h, 0, 0}, {-1, 0, 0}},
+      {"Unreal", {0, 0, 1}, {h, 0, 0, h}, {0, 0, -1}},
+      {"three", {0, 1, 0}, {1, 0, 0, 0}, {0, 0, -1}},
+      {"three", {0, 1, 0}, {h, -h, 0, 0}, {0, 1, 0}},
+      {"three", {0, 1, 0}, {h, h, 0, 0}, {0, -1, 0}},
+      {"three", {0, 1, 0}, {h, 0, 0, -h}, {1, 0, 0}},
+      {"three", {0, 1, 0}, {h, 0, 0, h}, {-1, 0, 0}},
+      {"three", {0, 0, 1}, {h, h, 0, 0}, {0, 0, -1}},
+      {"headset", {0, 1, 0}, {1, 0, 0, 0}, {0, 0, -1}},
+      {"headset", {0, 1, 0}, {h, h, 0, 0}, {0, 1, 0}},
+      {"headset", {0, 1, 0}, {h, -h, 0, 0}, {0, -1, 0}},
+      {"headset", {0, 1, 0}, {h, 0, 0, h}, {1, 0, 0}},
+      {"headset", {0, 1, 0}, {h, 0, 0, -h}, {-1, 0, 0}},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    double matrix[9];
+    double g[3];
+    const double *q = cases[i].rotation;
+    const double *expected = cases[i].gravity;
+    assert_int_equal(supine_posture_rotation(q, 4, cases[i].up, cases[i].axes, g, NULL), SUPINE_OK);
+    assert_vector(g, expected[0], expected[1], expected[2]);
+    supine_quaternion_matrix(q, matrix);
+    assert_int_equal(supine_posture_rotation(matrix, 9, cases[i].up, cases[i].axes, g, NULL),
+                     SUPINE_OK);
+    assert_vector(g, expected[0], expected[1], expected[2]);
+  }
 }
 
 /* Rotate v by the quaternion q: out = q v q*, written with cross products. */
@@ -120,7 +156,7 @@ static void rotate(const double q[4], const double v[3], double out[3]) {
   out[2] = v[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
 }
 
-TEST(test_quaternion_random_maps_gravity_to_world_down) {
+TEST(test_rotation_random_maps_gravity_to_world_down) {
   uint64_t random = 20080321;
   for (int i = 0; i < 1000; ++i) {
     double q[4];
@@ -129,27 +165,51 @@ TEST(test_quaternion_random_maps_gravity_to_world_down) {
       q[j] = fixture_random(&random);
       square += q[j] * q[j];
     }
-    double g[3];
-    assert_int_equal(supine_posture_quaternion(q, g), SUPINE_OK);
     for (int j = 0; j < 4; ++j) {
       q[j] /= sqrt(square);
     }
+    double g[3];
+    const double up[3] = {0, 0, 3};
+    assert_int_equal(supine_posture_rotation(q, 4, up, "lps", g, NULL), SUPINE_OK);
     double world[3];
     rotate(q, g, world);
     assert_vector(world, 0, 0, -1);
   }
 }
 
-TEST(test_quaternion_zero_or_not_finite_refused) {
-  double g[3];
-  assert_int_equal(supine_posture_quaternion((double[]){0, 0, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_posture_quaternion((double[]){1, NAN, 0, 0}, g), SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_posture_quaternion((double[]){INFINITY, 0, 0, 0}, g),
+static void expect_no_rotation(const double *rotation, size_t count, const double up[3],
+                               const char *axes, const char *message) {
+  double g[3] = {9, 8, 7};
+  supine_error error;
+  assert_int_equal(supine_posture_rotation(rotation, count, up, axes, g, &error),
                    SUPINE_ERROR_ARGUMENT);
-  assert_int_equal(supine_posture_quaternion((double[]){1e300, 0, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1);
-  assert_int_equal(supine_posture_quaternion((double[]){5e-324, 0, 0, 0}, g), SUPINE_OK);
-  assert_vector(g, 0, 0, -1);
+  assert_non_null(strstr(error.message, message));
+  assert_vector(g, 9, 8, 7);
+}
+
+TEST(test_rotation_not_rigid_mirrored_or_not_finite_refused) {
+  const double up[3] = {0, 1, 0};
+  const double unit[4] = {1, 0, 0, 0};
+  const double mirrored[9] = {-1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double sheared[9] = {1, 0.01, 0, 0, 1, 0, 0, 0, 1};
+  expect_no_rotation((double[]){0, 0, 0, 0}, 4, up, "lps", "scale 0 instead of 1");
+  expect_no_rotation((double[]){1, NAN, 0, 0}, 4, up, "lps", "scale ");
+  expect_no_rotation((double[]){INFINITY, 0, 0, 0}, 4, up, "lps", "scale ");
+  expect_no_rotation((double[]){1.001, 0, 0, 0}, 4, up, "lps", "scale 1.002 instead of 1");
+  expect_no_rotation((double[]){1, 1, 0, 0}, 4, up, "unity", "Normalise the quaternion");
+  expect_no_rotation(mirrored, 9, up, "unity", "scale -1 instead of 1 (mirrored)");
+  expect_no_rotation(sheared, 9, up, "three", "shear 0.005");
+  expect_no_rotation(unit, 3, up, "lps", "3 numbers: give a quaternion of 4 or a matrix of 9");
+  expect_no_rotation(unit, 4, (double[]){0, 0, 0}, "lps", "up is zero");
+  expect_no_rotation(unit, 4, (double[]){0, NAN, 1}, "lps", "up is zero or not finite");
+  expect_no_rotation(unit, 4, up, "unty",
+                     "no axes 'unty': give one of lps unity unreal three headset");
+  /* What rounding to 32-bit floats leaves is a rotation. */
+  double g[3];
+  assert_int_equal(
+      supine_posture_rotation((double[]){0.70710677f, -0.70710677f, 0, 0}, 4, up, "unity", g, NULL),
+      SUPINE_OK);
+  assert_vector(g, 0, 1, 0);
 }
 
 TEST(test_tilt_postures_literal) {

@@ -23,12 +23,16 @@ namespace UnityEngine
     public class Mesh
     {
         public Rendering.IndexFormat indexFormat;
-        public Vector3[] vertices;
+        public Vector3[] vertices, normals;
         public int[] triangles;
         public void MarkDynamic() {}
-        public void RecalculateNormals() {}
     }
     public class MeshFilter { public Mesh mesh; }
-    public class MonoBehaviour { public Transform transform; public T GetComponent<T>() where T : class { return null; } }
+    public class MonoBehaviour
+    {
+        readonly MeshFilter filter = new MeshFilter();
+        public Transform transform = new Transform();
+        public T GetComponent<T>() where T : class { return filter as T; }
+    }
 }
 namespace UnityEngine.Rendering { public enum IndexFormat { UInt16, UInt32 } }

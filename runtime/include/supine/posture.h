@@ -44,16 +44,37 @@ SUPINE_API const char *supine_posture_name(size_t index);
  * "sitting" and "standing" mean upright. */
 SUPINE_API const char *supine_posture_nearest(const char *name);
 
-/** Compute gravity in body axes for a body with the orientation R, a rotation that takes a vector
- * from body axes to world axes: v_world = R v_body. The world's z axis points up:
+/** Compute gravity in body axes for a body that an engine or a headset has rotated by R, a rotation
+ * that takes a vector from the axes of the body's object to those of the world: v_world = R v_object.
  *
- *     gravity = R^T (0, 0, -1)
+ *     gravity = -B R^T up
  *
- * The identity (1, 0, 0, 0) is upright. Turning the body about the world's z axis changes nothing.
- * @param quaternion  R as W, X, Y, Z, of any length but 0
- * @param gravity     [3] unit vector, written
- * @retval SUPINE_ERROR_ARGUMENT  the quaternion is zero or not finite */
-SUPINE_API supine_status supine_posture_quaternion(const double quaternion[4], double gravity[3]);
+ * B takes a vector from the object's axes to body axes. `axes` names it by which way an object that
+ * stands without rotation (R = 1) faces, and by where its left, back and head are:
+ *
+ *     axes     left  back  head   objects of                                         faces  hand
+ *     lps       x     y     z     DICOM, the axes of this library                    -y     right
+ *     unity    -x    -z     y     Unity                                              +z     left
+ *     unreal   -y    -x     z     Unreal Engine                                      +x     left
+ *     three     x    -z     y     three.js, glTF, faces in ARKit                     +z     right
+ *     headset  -x     z     y     viewers in WebXR, OpenXR, visionOS; three's camera -z     right
+ *
+ * R is as the engine has it: a left-handed engine's rotation is no reflection. Give the conjugate of
+ * a quaternion, or the transposed matrix, that goes from the world to the body. Turning the body
+ * about `up` changes nothing.
+ * @param rotation  [count] R: a unit quaternion W, X, Y, Z, or a matrix, row by row; three.js and
+ *                  glTF store matrices column by column
+ * @param count     4 or 9
+ * @param up        [3] direction that points up, in the axes of the world, of any length but 0:
+ *                  (0, 0, 1) in Unreal Engine, (0, 1, 0) in the others
+ * @param axes      name of the object's axes, in upper or lower case
+ * @param gravity   [3] unit vector, written
+ * @retval SUPINE_ERROR_ARGUMENT  R deviates from a rotation by more than 0.001 (a quaternion that is
+ *                                not of unit length, a scale, a shear), is mirrored or not finite,
+ *                                `up` is zero or not finite, or the name or the count is unknown */
+SUPINE_API supine_status supine_posture_rotation(const double *rotation, size_t count,
+                                                 const double up[3], const char *axes,
+                                                 double gravity[3], supine_error *error);
 
 /** Tilt the body by the angle t = `degrees`, so that gravity turns towards the head:
  *

@@ -34,7 +34,7 @@ from ._library import (ArgumentError, Error, FormatError, MeshError, NumericalEr
 from ._program import save_fields
 
 __all__ = ["open", "precompute", "save_fields", "embed", "augment", "random_states", "another_day", "Deform", "Sample",
-           "Basis", "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_quaternion", "tilt", "roll",
+           "Basis", "Pose", "Location", "Target", "Fact", "gravity", "gravity_of_rotation", "tilt", "roll",
            "postures", "breath", "Gravity", "Error", "ArgumentError", "FormatError", "MeshError", "NumericalError",
            "OpenSurfaceError", "OutOfMemoryError", "ReadError", "UnsupportedError"]
 __version__: str = _c.string(_c.version())
@@ -75,13 +75,17 @@ def gravity(posture: Gravity) -> Doubles:
     return np.array(_three(posture))
 
 
-def gravity_of_quaternion(quaternion: Sequence[float]) -> Doubles:
-    """Compute gravity for a body's orientation, given by a quaternion W, X, Y, Z. It rotates from body axes to world
-    axes, whose z points up."""
+def gravity_of_rotation(rotation: ArrayLike, up: Sequence[float], axes: str = "lps") -> Doubles:
+    """Compute gravity for a body that an engine or a headset has rotated.
+
+    rotation: unit quaternion W, X, Y, Z, or matrix [3, 3], from the axes of the body's object to those of the world
+    up: direction in the world that points up, such as (0, 1, 0)
+    axes: axes of the object: lps, unity, unreal, three or headset (`supine_posture_rotation` in C says where each has
+        the patient's left, back and head)
+    """
     out = (ctypes.c_double * 3)()
-    status = _c.posture_quaternion(_numbers(quaternion, 4, "quaternion"), out)
-    if status != 0:
-        _c.fail(status)
+    size = np.size(rotation)
+    _c.posture_rotation(_numbers(rotation, size, "rotation"), size, _numbers(up, 3, "up"), axes.encode(), out)
     return np.array(out)
 
 
