@@ -25,7 +25,9 @@ typedef struct playing {
   double *time;        /* [frames] time since the start, s */
   supine_state *state; /* [frames] */
   double *gravity;     /* [frames, 3] unit vectors */
-  double *expected;    /* [frames] expected error of the displacements, RMS over the vertices, mm */
+  /* [frames] expected errors, RMS over the vertices, mm: of the displacements, and of the positions
+   * in the session of the scan and on another day */
+  double *moved_error, *expected_error, *another_day_error;
   double *volumes;     /* [frames, lungs] volume of gas and tissue, mL */
   double *total;       /* [frames] sum of `volumes` over the lungs, mL */
   supine_mesh mesh;    /* triangles; for VTP output, also the positions of the current frame */
@@ -55,7 +57,9 @@ static supine_status begin_frames(playing *p, bool one, supine_error *error) {
   p->gravity = supine_arena_take(&p->arena, count, 3 * sizeof *p->gravity);
   p->volumes = supine_arena_take(&p->arena, count, p->lung_count * sizeof *p->volumes);
   p->total = supine_arena_take(&p->arena, count, sizeof *p->total);
-  p->expected = supine_arena_take(&p->arena, count, sizeof *p->expected);
+  p->moved_error = supine_arena_take(&p->arena, count, sizeof *p->moved_error);
+  p->expected_error = supine_arena_take(&p->arena, count, sizeof *p->expected_error);
+  p->another_day_error = supine_arena_take(&p->arena, count, sizeof *p->another_day_error);
   p->compute_time = supine_arena_take(&p->arena, count, sizeof *p->compute_time);
   p->origin = supine_arena_take(&p->arena, frame, sizeof *p->origin);
   p->normals = supine_arena_take(&p->arena, frame, sizeof *p->normals);
@@ -126,16 +130,18 @@ static supine_status next_frame(void *context, size_t t, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Compute the expected error of the displacements of each frame from the state `from`. Set `known`
- * to false for a basis without expected errors. */
+/* Compute the expected errors of each frame, whose displacements are from the state `from`. Set
+ * `known` to false for a basis without expected errors. */
 static supine_status find_expected(const playing *p, const supine_state *from, bool *known,
                                    supine_error *error) {
   *known = true;
   for (size_t t = 0; t < p->wanted->breath.count && *known; ++t) {
-    SUPINE_FREED_BY(supine_posed_expected_free) supine_expected expected = {0};
-    SUPINE_TRY(supine_posed_expected(p->basis, &p->state[t], from, &expected, error));
-    *known = expected.sigma != NULL;
-    p->expected[t] = expected.rms;
+    SUPINE_FREED_BY(supine_posed_errors_free) supine_errors errors = {.moved = {0}};
+    SUPINE_TRY(supine_posed_errors(p->basis, &p->state[t], from, &errors, error));
+    *known = errors.moved.sigma != NULL;
+    p->moved_error[t] = errors.moved.rms;
+    p->expected_error[t] = errors.position.rms;
+    p->another_day_error[t] = errors.position.another_rms;
   }
   return SUPINE_OK;
 }
@@ -147,7 +153,9 @@ static supine_status write_vtp(playing *p, const supine_state *from, supine_mesh
   const supine_tensor *lung = supine_basis_tensor(p->basis, "lung");
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, p->gravity},
                                       {"volume_mL", p->lung_count, p->volumes},
-                                      {"expected_error_RMS_mm", 1, p->expected}};
+                                      {"moved_error_RMS_mm", 1, p->moved_error},
+                                      {"expected_error_RMS_mm", 1, p->expected_error},
+                                      {"another_day_error_RMS_mm", 1, p->another_day_error}};
   const supine_mesh_frames frames = {p->wanted->breath.count, p->time, next_frame, p};
   bool known;
   SUPINE_TRY(find_expected(p, from, &known, error));
@@ -155,7 +163,7 @@ static supine_status write_vtp(playing *p, const supine_state *from, supine_mesh
   save.normals = p->normals;
   save.lung = lung == NULL ? NULL : lung->data;
   save.fields = fields;
-  save.field_count = known ? 3 : 2;
+  save.field_count = known ? 5 : 2;
   return supine_mesh_save_frames(p->wanted->path, &p->mesh, &save, &frames, error);
 }
 

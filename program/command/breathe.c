@@ -23,7 +23,7 @@ static const char *const courses[] = {"cosine", "ramp", "flow", NULL};
 static const supine_option table[] = {
     {"output", 'o', "OUT",
      "NAME.vtp: one file of all frames for ParaView, which shows the index of a frame as its time. "
-     "Each frame has displacements from the state of --from, the RMS of their expected error, "
+     "Each frame has displacements from the state of --from, the RMS of the expected errors, "
      "normals, the lung of each point, gravity and volumes\nNAME.safetensors: positions [T,N,3] in "
      "mm, triangles [M,3], time [T] in s, volume [T,G] in mL and gravity [T,3], for T frames, N "
      "vertices, M triangles and G lungs",
