@@ -168,8 +168,11 @@ assert.deepEqual(large.names, ['lobe']);
 assert.deepEqual([large.shells.length, large.shells[0].count, large.targetCorners], [1, 36, 0]);
 assert.deepEqual(large.own.map(Boolean), [...NAMES.map(() => false), true]);
 const shell = await after(page, () => page.locator('#inside-rows button').last().click());
-assert.ok(shell.lines.includes(large.own.at(-1)), `${shell.lines}`);
-assert.ok(!shell.drawn.some((text) => text.startsWith('halo: ')), `${shell.drawn}`);
+const chosen = await page.evaluate(() =>
+  getComputedStyle(document.documentElement).getPropertyValue('--change').trim(),
+);
+assert.ok(shell.lines.includes(chosen) && !shell.lines.includes(large.own.at(-1)), `${shell.lines}`);
+assert.ok(!shell.drawn.some((text) => text.startsWith('ring: ')), `${shell.drawn}`);
 assert.match(shell.finding, /^Lying on the left side, lobe moves/);
 const place = await page.evaluate(() => {
   const {

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
-import { basis } from './lungs.mjs';
+import { basis, mesh } from './lungs.mjs';
 import { folder, largestDistance, loadCommon, pictureFolder, supine } from './support.mjs';
 
 const axe = loadCommon('axe-core').source;
@@ -365,7 +365,9 @@ async function checkMany() {
   await page.locator('#inside-find').fill('NODE 22');
   assert.deepEqual(await rows(), ['node 22', ...Array.from({ length: 10 }, (_, i) => `node ${220 + i}`)]);
   await page.waitForFunction(() =>
-    [...document.querySelectorAll('#inside-rows td:last-child')].every((cell) => /^\d+\.\d mm$/.test(cell.textContent)),
+    [...document.querySelectorAll('#inside-rows td:nth-child(4)')].every((cell) =>
+      /^\d+\.\d mm$/.test(cell.textContent),
+    ),
   );
   await page.locator('#inside-rows button').last().click();
   assert.deepEqual(await page.evaluate(() => window.supine.basis.inside.names[window.supine.state.chosen]), 'node 229');
@@ -373,8 +375,8 @@ async function checkMany() {
   await close(page);
 }
 
-/** Return the displacement of a structure, and the expected error of its position on another day, mm, that `supine
- * deform` states at a volume above rest. */
+/** Return the displacement of a structure, and the expected errors of its position on another day and in the session of
+ * the scan, mm, that `supine deform` states at a volume above rest. */
 function statedFor(name, depth) {
   const state = ['--from', 'supine:rest', '--posture', 'supine', '--volume', `rest+${depth}`];
   supine('deform', files['inside.safetensors'], ...state, '-o', files['moved.csv']);
@@ -383,7 +385,56 @@ function statedFor(name, depth) {
     .filter((line) => !line.startsWith('#'))
     .map((line) => line.replaceAll('"', '').split(','));
   const row = lines.find(([first]) => first === name);
-  return ['moved_mm', 'another_day_error_mm'].map((column) => Number(row[lines[0].indexOf(column)]));
+  const columns = ['moved_mm', 'another_day_error_mm', 'expected_error_mm'];
+  return columns.map((column) => Number(row[lines[0].indexOf(column)]));
+}
+
+/** Check that the row of a target states the error of its place on another day that `supine deform` states and,
+ * with one switch or by the link, that in the same session; and that the scan's own state is of the same session. */
+async function checkDays(page) {
+  const shown = () =>
+    page.evaluate(() => {
+      const row = document.querySelector('#inside-rows .chosen');
+      const checked = document.querySelector('[name=day]:checked');
+      return [row.cells[0].textContent, row.cells[4].textContent, checked.labels[0].textContent];
+    });
+  const follow = async (link) => {
+    await page.evaluate((text) => {
+      location.hash = text;
+    }, link);
+    await settled(page);
+    await settled(page);
+  };
+  await follow('posture=supine&depth=430&target=4&show=contours');
+  const [name] = await shown();
+  const [, another, same] = statedFor(name, 430);
+  assert.ok(another > same + 0.5, `${another} and ${same}`);
+  const states = async (error, day) => {
+    const [, words, chosen] = await shown();
+    const [, mm, named] = /^within ([\d.]+)\u00a0mm, (.*)$/.exec(words);
+    assert.ok(Math.abs(mm - error) < WRITTEN_MM, `${words}, not ${error}`);
+    assert.deepEqual([named, chosen], [day, day]);
+  };
+  await states(another, 'another day');
+  await page.locator('[name=day][value=session]').check();
+  await settled(page);
+  await states(same, 'same session');
+  await follow('posture=supine&depth=430&target=4&show=contours&day=session');
+  await states(same, 'same session');
+  await follow('posture=supine&depth=430&target=4&show=contours');
+  await states(another, 'another day');
+  const [scan, part, scanned] = ['scan.safetensors', 'part.safetensors', 'scan.html'].map((file) => join(folder, file));
+  supine('precompute', mesh, '--scanned', 'supine:rest', '--band', '3', '--held-out', '10', '-o', scan);
+  supine('embed', scan, files['points.csv'], '-o', part);
+  supine('export', scan, '--inside', part, '-o', scanned);
+  for (const [posture, words] of [
+    ['supine', /^within 0\.0\u00a0mm, same session$/],
+    ['prone', /, another day$/],
+  ]) {
+    const { page: own } = await openLungs(scanned, {}, `#posture=${posture}`);
+    assert.match(await own.locator('#inside-rows td:nth-child(5)').first().textContent(), words);
+    await close(own);
+  }
 }
 
 /** Check that, in the middle of a breath and after a jump, the lens has the displacement and the expected error that
@@ -409,7 +460,7 @@ async function checkLens() {
         new Promise((done) => {
           new Function(text)();
           const look = () => {
-            const at = window.drawn.findLastIndex((words) => /^halo: /.test(words));
+            const at = window.drawn.findLastIndex((words) => /^ring: /.test(words));
             if (at >= 0 && window.supine.state.depth > 100)
               done({ words: window.drawn.slice(0, at + 1), depth: window.supine.state.depth });
             else {
@@ -430,17 +481,17 @@ async function checkLens() {
     const { words, depth } = await frame(act);
     const name = await breathing.evaluate(() => window.supine.basis.inside.names[window.supine.state.chosen]);
     const [mm, error] = statedFor(name, depth);
-    const [halo, length] = [words.at(-1), words.findLast((text) => /^[\d.]+ mm$/.test(text))].map((text) =>
+    const [ring, length] = [words.at(-1), words.findLast((text) => /^[\d.]+ mm$/.test(text))].map((text) =>
       Number(/([\d.]+) mm/.exec(text)[1]),
     );
     console.log(
-      `lens ${when}, rest + ${depth.toFixed(0)} mL: ${length} mm with an error of ${halo} mm; ` +
+      `lens ${when}, rest + ${depth.toFixed(0)} mL: ${length} mm with an error of ${ring} mm; ` +
         `supine deform: ${mm}, ${error} mm`,
     );
     assert.ok(Math.abs(length - mm) < WRITTEN_MM, `${when}: ${length} mm, not ${mm}`);
     assert.ok(
-      Math.abs(halo - error) < (error < 3 ? 0.05 : 0.5) + 0.02,
-      `${when}: an error of ${halo} mm, not ${error}`,
+      Math.abs(ring - error) < (error < 3 ? 0.05 : 0.5) + 0.02,
+      `${when}: an error of ${ring} mm, not ${error}`,
     );
   }
   assert.deepEqual(told, []);
@@ -451,6 +502,7 @@ const { page, complaints } = await openLungs(files['inside.html'], { viewport: {
 await checkPositions(page);
 await checkPointer(page, await checkTable(page));
 await checkControls(page);
+await checkDays(page);
 assert.deepEqual(complaints, []);
 await checkLoss(page);
 await close(page);

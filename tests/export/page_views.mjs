@@ -90,6 +90,25 @@ async function checkPostures(page) {
     if (text === 'left+45') assert.ok(Math.abs(gravity[2] - Math.SQRT1_2) < 1e-12, 'left+45 does not lower the head');
     if (text === 'supine+15') assert.ok(Math.abs(gravity[2] - Math.sin(Math.PI / 12)) < 1e-12);
   }
+  for (const [text, words] of [
+    ['supine', 'supine'],
+    ['left', 'left side'],
+    ['right-20', 'right side, head 20 degrees up'],
+    ['0.81:0.57:0.17', 'supine, rolled 55 degrees to the left, head 10 degrees down'],
+    ['-0.86:-0.5:0', 'prone, rolled 60 degrees to the right'],
+    ['0:0.34:-0.94', 'upright, leaning 20 degrees back'],
+    ['-0.2:-0.2:-0.96', 'upright, leaning 16 degrees forward and to the right'],
+    ['0.34:0:0.94', 'inverted, leaning 20 degrees to the left'],
+  ])
+    assert.equal(
+      await page.evaluate((name) => {
+        const { postureWords, postureFrom, gravityOf, state } = window.supine;
+        const { q, tilt } = postureFrom(name);
+        state.settle(q, tilt, 0);
+        return postureWords(gravityOf(state.goal));
+      }, text),
+      words,
+    );
   await page.locator('#posture-name').fill('0.6:0:-0.8');
   await page.keyboard.press('Enter');
   await page.waitForFunction(() => Math.abs(window.supine.state.gravity[0] - 0.6) < 1e-9);

@@ -108,7 +108,9 @@ for (let i = 0; i <= 400; ++i) {
 }
 await expectGravity([-Math.sin(2.1), Math.cos(2.1), 0], 'the last of many');
 
-await viewers[0].waitForFunction(() => /^With gravity along /.test(document.getElementById('finding').textContent));
+await viewers[0].waitForFunction(() =>
+  /^Prone, rolled 60 degrees to the right \(/.test(document.getElementById('finding').textContent),
+);
 // The sentence changed only after each posture had settled, and says nothing of the breath.
 const [announced, sentence, cards] = await viewers[0].evaluate(() => [
   window.announced,

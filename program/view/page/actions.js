@@ -137,6 +137,11 @@ function bindButtons() {
   );
   bindRange('begin', (x) => x < state.range.end, () => `a number below ${plain(state.range.end)}`);
   bindRange('end', (x) => x > state.range.begin, () => `a number above ${plain(state.range.begin)}`);
+  for (const input of document.getElementsByName('day'))
+    input.addEventListener('change', () => {
+      state.day = input.value;
+      redraw();
+    });
   $('range-auto').addEventListener(
     'click',
     change(() => {

@@ -5,7 +5,8 @@
 function buildFroms() {
   if (basis.froms.length > 1) {
     const group = document.createElement('div');
-    Object.assign(group, { id: 'since', role: 'radiogroup', ariaLabel: 'Displacements are measured' });
+    Object.assign(group, { id: 'since', className: 'either', role: 'radiogroup' });
+    group.ariaLabel = 'Displacements are measured';
     basis.froms.forEach((from, i) => {
       const [label, input, words] = ['label', 'input', 'span'].map((tag) => document.createElement(tag));
       Object.assign(input, { type: 'radio', name: 'since', value: i });

@@ -72,15 +72,30 @@ function movedBetween(basis, now, from) {
  * `session` of the position in the session of the scan, and `place` of the position on another day. */
 function targetsBetween(inside, now, from) {
   const found = pose(inside.library, now).targets(from.state);
-  const none = { name: '', at: [0, 0, 0], was: [0, 0, 0], move: [0, 0, 0], mm: 0, error: 1, session: 1, place: 1 };
+  const still = { at: [0, 0, 0], was: [0, 0, 0], move: [0, 0, 0], mm: 0 };
+  const none = { name: '', anatomy: false, ...still, error: 1, session: 1, place: 1 };
   return inside.members.map((members) => {
     if (!members.length) return none;
-    const { name, at, move, mm, expectedError, anotherDayError, movedError } = found.shift();
+    const { name, anatomy, at, move, mm, expectedError, anotherDayError, movedError } = found.shift();
     const errors = [movedError, expectedError, anotherDayError];
     const [error, session, place] = errors.map((x) => (Number.isNaN(x) ? null : x));
-    return { name: name || '(no name)', at, was: at.map((x, i) => x - move[i]), move, mm, error, session, place };
+    const was = at.map((x, i) => x - move[i]);
+    return { name: name || '(no name)', anatomy, at, was, move, mm, error, session, place };
   });
 }
+
+/** Choices of the error of a target's place: its name, or which is taken by default. */
+const DAYS = { automatic: '', another: 'another day', session: 'same session' };
+
+/** Return the expected error of a target's place, mm, and the name of its day. By default it is the error on another
+ * day, unless the lungs are as in the scan, where its session has none. */
+function ringOf({ session, place }, day) {
+  const chosen = day === 'automatic' && session < 0.05 ? 'session' : day;
+  return chosen === 'session' ? { error: session, day: DAYS.session } : { error: place, day: DAYS.another };
+}
+
+/** Return the verb of a sentence about a target. Structures may have plural names, such as airways or bronchi. */
+const verbOf = ({ anatomy, name }) => (anatomy && /([^sui]s|chi|chia)$/i.test(name) ? 'move' : 'moves');
 
 /** Return whether a displacement exceeds its expected error. */
 const isTold = ({ mm, error }) => error === null || mm > error;
@@ -119,15 +134,14 @@ function wayWords(move, most, gravity) {
   return words.join(', ') || 'less than 1 in any direction';
 }
 
-/** Return the beginning of a sentence on a posture: "Lying on the left side", "Supine, 15 degrees head down". */
+/** Return the beginning of a sentence on a posture: "Lying on the left side", or, with gravity behind it where it is no
+ * round angle, "Supine, rolled 55 degrees to the left (0.82:0.57:0.00)". */
 function whereWords(gravity) {
+  const words = postureWords(gravity);
   const text = postureText(gravity);
-  const [, name, roll, tilt] = /^([a-z]+)(?:@(-?\d+))?([+-]\d+)?$/.exec(text) ?? [];
-  if (!name) return `With gravity along ${text.replaceAll('-', '\u2212')}`;
-  const lying =
-    name === 'left' || name === 'right' ? `Lying on the ${name} side` : `${name[0].toUpperCase()}${name.slice(1)}`;
-  const rolled = roll ? `, rolled ${Math.abs(roll)} degrees to the ${roll > 0 ? 'left' : 'right'}` : '';
-  return `${lying}${rolled}${tilt ? `, ${Math.abs(tilt)} degrees head ${tilt > 0 ? 'down' : 'up'}` : ''}`;
+  const numbers = text.includes(':') ? ` (${text.replaceAll('-', '\u2212')})` : '';
+  const lying = / side/.test(words) ? `lying on the ${words}` : words;
+  return `${lying[0].toUpperCase()}${lying.slice(1)}${numbers}`;
 }
 
 /** Return where a vertex is on its lung: "at the base of the right lung". */
@@ -166,7 +180,7 @@ function spreadWords(session, place, samePosture) {
 function sentenceOf(basis, moved, target, gravity, above) {
   const { name } = moved.from;
   const where = `${whereWords(gravity)}${above && `, ${above}`}, `;
-  const who = target ? target.name : 'the surface';
+  const who = `${target ? target.name : 'the surface'} ${verbOf(target ?? {})}`;
   const { mm, error, session, place } = target ?? { ...moved, mm: moved.mean };
   if (moved.largest < 0.05)
     return {
@@ -181,7 +195,7 @@ function sentenceOf(basis, moved, target, gravity, above) {
   if (!isTold({ mm, error }))
     return {
       before:
-        `${where}${who} moves ${mm.toFixed(1)} mm from ${name}, ${withinWords(error)}: ` +
+        `${where}${who} ${mm.toFixed(1)} mm from ${name}, ${withinWords(error)}: ` +
         'no change that the model can tell.',
       told: '',
       after: '',
@@ -189,9 +203,9 @@ function sentenceOf(basis, moved, target, gravity, above) {
       meaning: half,
     };
   const [told, after] = target
-    ? [`moves ${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`]
+    ? [`${mm.toFixed(1)} mm`, `: ${wayWords(target.move, 2)}`]
     : [
-        `moves ${mm.toFixed(1)} mm on average`,
+        `${mm.toFixed(1)} mm on average`,
         `, ${moved.largest.toFixed(1)} mm at most, ${spotWords(basis, moved.at)}`,
       ];
   return {

@@ -135,10 +135,11 @@ function anatomyPlaces(inside, moment) {
   return places;
 }
 
-/** Return the lines along which the meshes of anatomy cross the plane at `at` mm on an axis: for each mesh its colour
- * and the result of linesAcross. `places` is the result of anatomyPlaces. */
+/** Return the lines along which the meshes of anatomy cross the plane at `at` mm on an axis: for each mesh its part,
+ * its colour and the result of linesAcross. `places` is the result of anatomyPlaces. */
 const anatomyLines = ({ shells, corners, vertices }, places, axis, at) =>
-  shells.map(({ colour, begin, count }) => ({
+  shells.map(({ part, colour, begin, count }) => ({
+    part,
     colour: ANATOMY_COLOURS[colour],
     lines: linesAcross({ corners: corners.subarray(begin, begin + count), vertices }, places, axis, at),
   }));
@@ -153,6 +154,12 @@ function insideNearest(inside, part, moment, place) {
   return best;
 }
 
+/** Return what the parts are: anatomy, such as lobes and airways, is called structures. */
+function kindWords({ names, anatomy }) {
+  if (!anatomy.length) return 'Targets';
+  return anatomy.length === names.length ? 'Structures' : 'Targets and structures';
+}
+
 /** Largest number of rows in the table of parts; a search by name finds other parts. */
 const ROWS_SHOWN = 200;
 
@@ -162,6 +169,8 @@ class TargetTable {
   constructor(inside, state, choose) {
     Object.assign(this, { inside, state, choose, rows: [], pointed: -1, moved: null });
     $('targets').hidden = false;
+    for (const id of ['targets-title', 'inside-name']) write(id, kindWords(inside));
+    $('inside-scroll').ariaLabel = `List of ${kindWords(inside).toLowerCase()}`;
     $('inside-find').hidden = inside.names.length <= 20;
     $('inside-find').addEventListener('input', () => this.list());
     this.list();
@@ -185,11 +194,12 @@ class TargetTable {
   }
 
   row(part) {
-    const [row, head, button, ...cells] = ['tr', 'th', 'button', 'td', 'td', 'td'].map((tag) =>
+    const [row, head, button, ...cells] = ['tr', 'th', 'button', 'td', 'td', 'td', 'td'].map((tag) =>
       document.createElement(tag),
     );
     head.scope = 'row';
     button.type = 'button';
+    button.dir = 'auto';
     button.textContent = this.inside.names[part] || '(no name)';
     const colour = anatomyColour(this.inside, part);
     if (colour) button.style.setProperty('--own', colour);
@@ -214,6 +224,7 @@ class TargetTable {
     for (const { part, row, cells } of this.rows) {
       const target = moved.targets[part];
       const told = isTold(target);
+      const ring = ringOf(target, this.state.day);
       row.classList.toggle('untold', !told);
       const texts = [
         `${target.mm.toFixed(1)} mm`,
@@ -223,6 +234,7 @@ class TargetTable {
             ? wayWords(target.move, 3, moved.now.gravity)
             : withinWords(target.error),
         target.error === null ? 'unknown' : `${target.error.toFixed(1)} mm`,
+        ring.error === null ? 'unknown' : `within ${ring.error.toFixed(1)}\u00a0mm, ${ring.day}`,
       ];
       cells.forEach((cell, i) => {
         if (cell.textContent !== texts[i]) cell.textContent = texts[i];

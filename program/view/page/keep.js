@@ -167,6 +167,14 @@ const LINK = {
     },
     () => 0,
   ),
+  day: worded(
+    () => Object.keys(DAYS),
+    ({ day }) => Object.keys(DAYS).indexOf(day),
+    (state, i) => {
+      state.day = Object.keys(DAYS)[i];
+    },
+    () => 0,
+  ),
   slices: {
     wants: () => 'middle, or x, y and z within the lungs, mm, such as 60:-120:-110',
     write: ({ slices }) => slices?.map((x) => round(x, 1)).join(':') ?? 'middle',

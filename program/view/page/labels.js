@@ -14,11 +14,13 @@ function drawNotes() {
   notes.context.scale(grown, grown);
   notes.taken = [];
   const small = width < 520;
+  let below = null; // place under the lens, [from the right, from the top]
   const [x, y] = [small ? 34 : width - 44, height - (small ? 100 : 92)];
   notes.gravity(pane, x, y, width);
   notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
-  if (inside && state.inside && state.moment && !state.turning) {
-    const between = targetsBetween(inside, state.moment, originMoment());
+  const isShown = inside && state.inside && state.moment && !state.turning;
+  const between = isShown ? targetsBetween(inside, state.moment, originMoment()) : [];
+  if (isShown) {
     const few = inside.names.length <= 6;
     for (const part of inside.names.map((_, i) => i).sort((a, b) => (b === state.chosen) - (a === state.chosen))) {
       if (!few && part !== state.chosen) break;
@@ -26,7 +28,7 @@ function drawNotes() {
       const target = between[part];
       const large = anatomyColour(inside, part);
       if (part === state.chosen && target.mm > 0.05 && !large)
-        notes.lens(pane, target, radii[part], originName(), unit, { width, height, grown });
+        below = notes.lens(pane, target, radii[part], originName(), unit, { width, height, grown });
       else {
         const [was, at] = [target.was, target.at].map((p) => project(pane, p, unit));
         if (!was || !at) continue;
@@ -35,10 +37,19 @@ function drawNotes() {
         if (!large && Math.hypot(at[0] - was[0], at[1] - was[1]) > 6) drawArrow(notes.context, was, at, 6);
         const moves = `${target.mm.toFixed(1)} mm${isTold(target) ? '' : `, ${withinWords(target.error)}`}`;
         const says = target.mm < 0.05 ? 'the reference' : moves;
-        notes.name(at, [shortName(target.name), ...(small ? [] : [says])], { width, height }, large ?? '--ink');
+        const colour = part === state.chosen ? '--change' : (large ?? '--ink');
+        notes.name(at, [shortName(target.name), ...(small ? [] : [says])], { width, height }, colour);
       }
     }
   }
+  if (below)
+    changed('day', ringOf(between[state.chosen], state.day).day, (day) => {
+      for (const input of document.getElementsByName('day')) input.checked = DAYS[input.value] === day;
+    });
+  changed('below', below?.map((x) => `${Math.round(x * grown)}px`).join(' '), (place) => {
+    $('day').hidden = !place;
+    [$('day').style.right, $('day').style.top] = place?.split(' ') ?? [];
+  });
   state.probes.forEach((vertex, i) => {
     const at = project(pane, placeOf(basis, state.moment, vertex), unit);
     if (at) notes.text(`\u25cf ${i + 1}`, ...at, { font: '700 13px' });

@@ -36,16 +36,17 @@ function drawArrow(context, [x, y], [u, v], head) {
   context.fill();
 }
 
-/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a halo as wide as the expected
+/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a ring as far away as the expected
  * error, and an arrow. Positions and sizes are pixels. */
-function drawTrace(context, was, at, radius, halo) {
+function drawTrace(context, was, at, radius, ring) {
   const circle = ([x, y], r) => {
     context.beginPath();
     context.arc(x, y, r, 0, 2 * Math.PI);
   };
-  context.fillStyle = css('--change');
+  context.fillStyle = context.strokeStyle = css('--change');
+  context.lineWidth = 1.5;
   for (const [alpha, r] of [
-    [0.25, radius + halo],
+    [0.25, radius + ring],
     [0.85, radius],
   ]) {
     context.globalAlpha = alpha;
@@ -53,6 +54,10 @@ function drawTrace(context, was, at, radius, halo) {
     context.fill();
   }
   context.globalAlpha = 1;
+  if (ring > 0) {
+    circle(at, radius + ring);
+    context.stroke();
+  }
   context.strokeStyle = context.fillStyle = css('--ink');
   context.lineWidth = 1.2;
   context.setLineDash([3, 2.5]);
@@ -154,16 +159,18 @@ class Notes {
   }
 
   /** Draw the chosen target's trace, and enlarged in a circle at the upper right, with its numbers beside it or, if the
-   * picture is narrow, its name and distance below. */
+   * picture is narrow, its name and distance below. Return the place under the lens, from the right
+   * and from the top; null if the target's error is unknown. */
   lens(pane, target, radius, from, ratio, { width, height, grown: unit }) {
     const { context, taken } = this;
     const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
-    if (!was || !at) return;
+    if (!was || !at) return null;
     const scale = 1 / (pane.pixel * unit); // units for each mm
     const narrow = width < 720;
     const size = Math.min(92, height * 0.2, width * 0.15);
     const middle = [width - size - (narrow ? 10 : 172), size + 12];
-    const error = target.place ?? 0;
+    const ring = ringOf(target, state.day);
+    const error = ring.error ?? 0;
     const grown = (0.92 * size) / Math.max(radius + error + 0.5 * target.mm, 10); // pixels for each mm in the lens
     drawTrace(context, was, at, Math.max(4, radius * scale), 0);
     context.fillStyle = context.strokeStyle = css('--line');
@@ -189,7 +196,7 @@ class Notes {
     const [old, now] = [was, at].map((p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown));
     drawTrace(context, old, now, radius * grown, error * grown);
     context.restore();
-    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 38 : 6)]);
+    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 68 : 36)]);
     if (narrow) {
       this.text(shortName(target.name), width - 10, middle[1] + size + 12, {
         align: 'right',
@@ -197,7 +204,7 @@ class Notes {
         font: '600 12px',
       });
       this.text(`${target.mm.toFixed(1)} mm`, width - 10, middle[1] + size + 28, { align: 'right', font: '600 12px' });
-      return;
+      return ring.error === null ? null : [10, middle[1] + size + 38];
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
     const lines = [
@@ -205,11 +212,13 @@ class Notes {
       [`${target.mm.toFixed(1)} mm`, '--ink', isTold(target) ? '650 14px' : '12px'],
       ...ways.map((way) => [way, '--ink', '12px']),
       [`dashed: ${from}`, '--soft', '12px'],
-      [`halo: ${errorText(error)} wide (error)`, '--soft', '12px'],
-    ].slice(0, target.error === null ? -1 : undefined);
+      [`ring: within ${errorText(error)},`, '--soft', '12px'],
+      [ring.day, '--soft', '12px'],
+    ].slice(0, ring.error === null ? -2 : undefined);
     lines.forEach(([words, colour, font], i) =>
-      this.text(words, middle[0] + size + 12, middle[1] - size + 24 + 18 * i, { colour, font }),
+      this.text(words, middle[0] + size + 12, middle[1] - size + 18 + 18 * i, { colour, font }),
     );
+    return ring.error === null ? null : [width - middle[0] - size, middle[1] + size + 6];
   }
 }
 

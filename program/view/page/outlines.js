@@ -178,11 +178,11 @@ class Outlines {
     path(before);
     context.stroke();
     context.setLineDash([]);
-    for (const { colour, lines } of this.basis.inside
+    for (const { part, colour, lines } of this.basis.inside
       ? anatomyLines(this.basis.inside, this.kept.large, axis, this.at[axis])
       : []) {
       path(lines);
-      context.strokeStyle = colour;
+      context.strokeStyle = part === this.state.chosen ? css('--change') : colour;
       context.lineWidth = 1.3;
       context.stroke();
     }

@@ -119,6 +119,7 @@ const forTests = {
   rangeEnd,
   tickStep,
   postureText,
+  postureWords,
   postureFrom,
   gravityOf,
   picturePng,

@@ -12,7 +12,7 @@ let buttons = []; // cards of the postures
 let table = null; // TargetTable, or null
 let stale = true; // whether the vertices are out of date
 let unseen = true; // whether the picture is out of date: the next frame draws it
-let told = null; // {gravity, depth, from, chosen}: what the texts describe; null makes them be written again
+let told = null; // {gravity, depth, from, chosen, day}: what the texts describe; null makes them be written again
 
 const CHECKBOXES = [...SHOWN, 'inside']; // ids of checkboxes; each sets the field of State with the same name
 

@@ -43,8 +43,29 @@ function postureText(gravity) {
   return gravity.map((v) => v.toFixed(2).replace('-0.00', '0.00')).join(':');
 }
 
-/** Return a direction of gravity as text: like postureText, but "left side" instead of "left". */
-const postureWords = (gravity) => postureText(gravity).replace(/^(left|right)$/, '$1 side');
+/** Return a direction of gravity in words: "left side", "supine, rolled 55 degrees to the left, head 10 degrees down",
+ * or "upright, leaning 20 degrees back". */
+function postureWords([x, y, z]) {
+  const degrees = (opposite, adjacent) => Math.round((Math.atan2(opposite, adjacent) * 180) / Math.PI);
+  const level = Math.hypot(x, y);
+  const tilt = degrees(z, level);
+  if (Math.abs(tilt) > 60) {
+    const lean = 90 - Math.abs(tilt);
+    const ways = [
+      [Math.abs(y), y > 0 ? 'back' : 'forward'],
+      [Math.abs(x), x > 0 ? 'to the left' : 'to the right'],
+    ].filter(([share]) => share > 0.38 * level); // 0.38: sine of a quarter of a right angle
+    const way = ways.map(([, word]) => word).join(' and ');
+    return `${z < 0 ? 'upright' : 'inverted'}${lean ? `, leaning ${lean} degrees ${way}` : ''}`;
+  }
+  const roll = degrees(Math.abs(x), y); // 0 supine, 180 prone
+  const side = x > 0 ? 'left' : 'right';
+  const rolled = Math.min(roll, 180 - roll);
+  const nearest = roll < 90 ? 'supine' : 'prone';
+  const lying = rolled === 90 ? `${side} side` : nearest;
+  const turned = rolled % 90 ? `, rolled ${rolled} degrees to the ${side}` : '';
+  return `${lying}${turned}${tilt ? `, head ${Math.abs(tilt)} degrees ${tilt > 0 ? 'down' : 'up'}` : ''}`;
+}
 
 /** What a text of a posture may be, in words. */
 const POSTURE_WANTED =
@@ -105,6 +126,7 @@ class State {
     this.inside = Boolean(basis.inside); // whether structures inside the lungs are shown
     this.chosen = 0; // structure inside the lungs that the sentence is about
     this.picked = false; // whether the user chose it; otherwise it is the one that firstTarget returns
+    this.day = 'automatic'; // key of DAYS
     this.opacity = Array(basis.lungs).fill(FADED);
     // Cutting plane: axis, or -1 for no cut; position as a fraction of the lungs' extent
     this.cut = { axis: -1, at: 0.5 };

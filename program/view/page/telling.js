@@ -14,6 +14,7 @@ const alike = (a, b) =>
   a.depth === b.depth &&
   a.from === b.from &&
   a.chosen === b.chosen &&
+  a.day === b.day &&
   dot(a.gravity, b.gravity) > Math.cos(0.03);
 
 /** Return the height of the centre of each lung, mm, measured opposite to gravity. */
@@ -23,7 +24,7 @@ const lungHeights = (gravity) => basis.lungBoxes.map(({ centre }) => -dot(gravit
  * and while a tracker moves the patient, they describe the end of an expiration. */
 function tellSettled(now) {
   const depth = state.playing || state.live ? state.expired : state.depth;
-  const wish = { gravity: state.gravity, depth, from: state.from, chosen: state.chosen };
+  const wish = { gravity: state.gravity, depth, from: state.from, chosen: state.chosen, day: state.day };
   if (!alike(wish, next)) [next, since] = [wish, now];
   if (alike(wish, told) || state.turning || now - since < (state.live ? 700 : 0)) return;
   told = wish;
@@ -43,7 +44,7 @@ function tellSettled(now) {
   write('meaning', sentence.meaning);
   write('surface-text', surfaceWords(moved));
   table?.show(moved);
-  write('targets-title', `Targets, ${whereWords(state.gravity).replace(/^./, (c) => c.toLowerCase())}`);
+  if (inside) write('targets-title', `${kindWords(inside)}, ${postureWords(state.gravity)}`);
   tellVolumes(moment, moved);
   outlines.show(moment, state.from, target, inside && anatomyColour(inside, state.chosen) ? 0 : radii?.[state.chosen]);
   write('outlines-title', target && !state.slices ? `Outlines through ${target.name}` : 'Outlines');
