@@ -13,6 +13,7 @@
 #     supine-<version>-linux-x86_64-glibc<G>.tar.gz      program and its libraries, for any Linux with glibc G or newer
 #     supine-<version>-py3-none-manylinux_*.whl          Python packages for x86-64 and aarch64
 #     supine-<version>.tgz                               npm package
+#     supine-<version>-binaries.spdx.json  .cdx.json     what these files contain and depend on (SPDX, CycloneDX)
 #     supine-<version>.spdx  RELEASE.md  SHA256SUMS      licences of the source files, release notes, checksums
 #
 # Needed in addition to the packages of `sh cmake/debian.sh build`: python3-wheel, python3-setuptools, reuse,
@@ -124,6 +125,7 @@ while read -r library; do
   package=$({ dpkg -S "$file" || dpkg -S "${file#/usr}"; } 2>/dev/null | cut -d: -f1)
   cp "/usr/share/doc/$package/copyright" "$top/share/doc/supine/libraries/$package.copyright"
   dpkg-query -W -f '${source:Package} ${source:Version}\n' "$package" >>"$work/stage/sources"
+  echo "${library##*/} $package" >>"$work/stage/packages"
 done <"$work/stage/libraries"
 sort -u "$work/stage/sources" >"$top/share/doc/supine/libraries/sources"
 chmod -R u=rwX,go=rX "$top"
@@ -137,6 +139,7 @@ tar -xzf "$out/$name.tar.gz" -C "$work/stage/source"
 (cd "$work/stage/source/$name" && reuse spdx 2>/dev/null) |
   sed "s|^DocumentNamespace: .*|DocumentNamespace: http://spdx.org/spdxdocs/$name-$commit|
     s|^Created: .*|Created: $(date -u -d "@$SOURCE_DATE_EPOCH" +%Y-%m-%dT%H:%M:%SZ)|" >"$out/$name.spdx"
+/usr/bin/python3 packaging/sbom.py "$out" "$version" "$commit" "$top" "$work/stage/packages"
 awk '/^## / { ++section } section == 1' CHANGELOG.md >"$out/RELEASE.md"
 
 # Check that what was built states the version.

@@ -14,6 +14,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/repository" "$work/a place"
 cd "$1"
+modules=$PWD/tests/export/node_modules
 tar -c --exclude=./build --exclude=./.git --exclude=./demo --exclude=node_modules . | tar -x -C "$work/repository"
 cd "$work/repository"
 export GIT_CONFIG_GLOBAL=/dev/null GIT_COMMITTER_DATE=2026-01-02T03:04:05Z GIT_AUTHOR_DATE=2026-01-02T03:04:05Z
@@ -56,7 +57,7 @@ sh packaging/release.sh "v$version" "$work/one" >"$work/log" 2>&1 || { cat "$wor
 diff "$work/one/SHA256SUMS" build/dist/SHA256SUMS || fail "the second release differs"
 cd "$work/one"
 sha256sum --quiet -c SHA256SUMS
-[ "$(wc -l <SHA256SUMS)" = 8 ] || fail "files: $(ls)"
+[ "$(wc -l <SHA256SUMS)" = 10 ] || fail "files: $(ls)"
 tar -tzf "supine-$version.tar.gz" | grep -q /base/text.c || fail "no source"
 grep -q '^FileName: ./base/text.c' "supine-$version.spdx" && grep -q '^## ' RELEASE.md || fail "SBOM or notes"
 grep -q "\[$version\]" RELEASE.md && ! grep -q '^## \[0.1.0\]' RELEASE.md || fail "notes of other versions"
@@ -65,6 +66,7 @@ grep -q "\[$version\]" RELEASE.md && ! grep -q '^## \[0.1.0\]' RELEASE.md || fai
 cd "$work/a place"
 tar -xzf "$work"/one/*-linux-x86_64-glibc*.tar.gz
 mv "supine-$version" "moved again"
+/usr/bin/python3 "$work/repository/tests/scripts/test_sbom.py" "$work/one" "moved again" "$modules" || fail "SBOM of the binaries"
 run() {
   env -i LD_DEBUG=libs "moved again/bin/supine" "$@" >log 2>&1 || { grep -v '^ *[0-9]*:' log; fail "supine $*"; }
   sed -n 's/.*calling init: //p' log >>loaded
