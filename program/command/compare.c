@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -14,11 +15,32 @@
 #include "program/options/fiducials.h"
 #include "program/options/hilum.h"
 #include "program/options/inside.h"
+#include "program/options/markups.h"
 #include "program/options/state_options.h"
 #include "program/report/comparison.h"
 
+/* Write the structures in each posture as a list of control points. */
+static supine_status write_markups(const char *path, const supine_comparison *c,
+                                   supine_error *error) {
+  json_t *lists = json_array();
+  char meaning[256 + SUPINE_CAVEATS_SIZE];
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(c->basis, caveats, sizeof caveats);
+  (void)supine_print_text(meaning, sizeof meaning, "displacement from %s; errors: %s; %s",
+                          c->reference.name, SUPINE_EXPECTED_MEANING, caveats);
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    (void)json_array_append_new(lists,
+                                supine_options_markup(c->postures.item[i].name, meaning,
+                                                      c->posture[i].targets, c->names.count));
+  }
+  return supine_options_markups_write(path, lists, error);
+}
+
 static supine_status write_file(const char *path, const supine_comparison *comparison,
                                 supine_error *error) {
+  if (supine_options_markups_named(path)) {
+    return write_markups(path, comparison, error);
+  }
   SUPINE_FREED_BY(supine_output_abandon) supine_output output = {0};
   SUPINE_TRY(supine_output_open(path, &output, error));
   if (supine_text_ends_in(path, ".csv")) {
@@ -57,8 +79,12 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, all)},
     {"output", 'o', "FILE",
      ".html: a report to read and print\n.csv: a table with a row for the surface, each lung and "
-     "each structure in each posture; docs/compare.md describes it and --json",
-     SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .endings = ".html or .csv"},
+     "each structure in each posture; docs/compare.md describes it and "
+     "--json\n" SUPINE_MARKUPS_ENDING
+     ": a list of control points of 3D Slicer for each posture, one for each "
+     "structure of --inside, in mm and LPS, with the errors as measurements",
+     SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT,
+     .endings = ".html, .csv or " SUPINE_MARKUPS_ENDING},
     {.name = NULL}};
 
 /* Append a structure to the list of targets or of anatomy. */
@@ -150,6 +176,11 @@ static void end(request **wanted) {
 
 /* Compute, print and write the comparison of the lungs. */
 static supine_status report(supine_comparison *c, const request *wanted, supine_error *error) {
+  SUPINE_REFUSE_IF(wanted->output != NULL && supine_options_markups_named(wanted->output) &&
+                       wanted->inside == NULL,
+                   error, SUPINE_ERROR_ARGUMENT,
+                   "%s: no structures to write: give --inside FILE, made by 'supine embed'",
+                   wanted->output);
   if (wanted->inside != NULL) {
     SUPINE_TRY(supine_options_inside_open(c->basis, wanted->inside, &c->inside, &c->names, error));
   }

@@ -14,6 +14,7 @@
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/facts.h"
+#include "program/options/markups.h"
 #include "program/options/state_notes.h"
 #include "program/options/state_options.h"
 
@@ -35,14 +36,16 @@ typedef struct request {
   char *outputs[3];
 } request;
 
-#define ENDINGS SUPINE_MESH_ENDINGS ", .csv, .nrrd, .nii, .nii.gz or .mha"
-#define OUTPUT_ENDINGS SUPINE_MESH_ENDINGS ", .csv, .safetensors, .nrrd, .nii, .nii.gz or .mha"
+#define POINTS_ENDINGS SUPINE_MESH_ENDINGS ", .csv, " SUPINE_MARKUPS_ENDING
+#define ENDINGS POINTS_ENDINGS ", .nrrd, .nii, .nii.gz or .mha"
+#define OUTPUT_ENDINGS POINTS_ENDINGS ", .safetensors, .nrrd, .nii, .nii.gz or .mha"
 
 static const supine_option table[] = {
     {"output", 'o', "FILE",
      "file to write: " SUPINE_MESH_ENDINGS
      "; PLY and VTP files include displacements and expected errors. Embedded points can also be "
-     "written as .csv, and moved images as .nrrd, .nii, .nii.gz or .mha; samples are .safetensors",
+     "written as .csv or " SUPINE_MARKUPS_ENDING
+     ", and moved images as .nrrd, .nii, .nii.gz or .mha; samples are .safetensors",
      SUPINE_FILLS(request, content.path), .file = SUPINE_FILE_OUT, .endings = OUTPUT_ENDINGS},
     {"states", 0, "LIST",
      "CSV file with a state in each row, in the columns posture, volume and output; the basis and "
@@ -177,7 +180,8 @@ static supine_status read_row(const supine_csv *csv, request *row, supine_error 
   const bool voxels = supine_image_supports(output);
   const bool image = row->content.image != NULL || row->content.labels != NULL;
   SUPINE_REFUSE_IF(!voxels && !supine_mesh_save_supports(output) &&
-                       !supine_text_ends_in(output, ".csv"),
+                       !supine_text_ends_in(output, ".csv") &&
+                       !supine_options_markups_named(output),
                    error, SUPINE_ERROR_ARGUMENT, "%s:%zu: %s: the name must end in %s", csv->path,
                    csv->line, output, ENDINGS);
   for (size_t i = 0; i < 3; ++i) { /* the columns output, labels and field */

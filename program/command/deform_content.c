@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write deformed surfaces, displacement fields, moved images, and a CSV file of moved points. */
+/* Write deformed surfaces, displacement fields, moved images and moved points. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +17,7 @@
 #include "program/command/deform_content.h"
 #include "program/options/facts.h"
 #include "program/options/inside.h"
+#include "program/options/markups.h"
 #include "program/options/surface_options.h"
 
 /* Parse a list of labels, such as "7" or "7,8". */
@@ -38,8 +39,10 @@ static supine_status read_rigid(const char *text, void *field, supine_error *err
 
 const supine_option supine_command_deform_content_options[] = {
     {.help = "For structures made by 'supine embed', -o FILE.csv writes a row for each named "
-             "structure: the mean position of its vertices, its displacement and expected error:"},
-    {"vertices", 0, NULL, "write a row for each vertex instead",
+             "structure: the mean position of its vertices, its displacement and expected error; "
+             "-o FILE" SUPINE_MARKUPS_ENDING " writes these as control points of 3D Slicer, in mm "
+             "and LPS, with the errors as measurements:"},
+    {"vertices", 0, NULL, "write a row or a control point for each vertex instead",
      SUPINE_FILLS(supine_deform_content, vertices)},
     {.help = "For an embedded grid:"},
     {"field-out", 0, "FILE",
@@ -140,9 +143,20 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   }
 }
 
-/* Print the rows of a CSV file: name, lung, position, displacement and expected error. */
-static void print_rows(const supine_deformation *moved, const supine_basis *basis,
-                       const supine_target *rows, size_t count, FILE *file) {
+/* Write what the numbers of markups mean, and what the basis assumes. */
+static void print_meaning(const supine_deformation *moved, const supine_basis *basis, char *text,
+                          size_t size) {
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
+  (void)supine_print_text(text, size, "displacement from %s; errors: %s; %s", moved->from.name,
+                          SUPINE_EXPECTED_MEANING, caveats);
+}
+
+/* Write a CSV file with a row for each target: name, lung, position, displacement and expected
+ * error. */
+static supine_status write_rows(const char *path, const supine_deformation *moved,
+                                const supine_basis *basis, const supine_target *rows, size_t count,
+                                supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_mesh_save_options *frame = &moved->save;
   const double unit = frame->millimetres_per_unit > 0.0 ? frame->millimetres_per_unit : 1.0;
@@ -150,11 +164,13 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
   char axes[4];
   char unit_name[24];
   char caveats[SUPINE_CAVEATS_SIZE];
+  supine_output output;
+  SUPINE_TRY(supine_output_open(path, &output, error));
   supine_mesh_unit_name(unit, unit_name);
   supine_mesh_axes_letters(frame->axes, axes);
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   (void)fprintf(
-      file,
+      output.file,
       "# x,y,z,dx,dy,dz: position and displacement from %s, %s, %s; moved_mm: length of "
       "the displacement%s; %s\nname,lung,x,y,z,dx,dy,dz,moved_mm%s\n",
       moved->from.name, axes, unit_name,
@@ -168,7 +184,7 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
     double move[3];
     in_frame(frame->axes, unit, row->at, at);
     in_frame(frame->axes, unit, row->move, move);
-    supine_csv_row line = {.file = file};
+    supine_csv_row line = {.file = output.file};
     supine_csv_add_text(&line, row->name);
     supine_csv_add_text(&line, info->lung_names[row->lung]);
     supine_csv_add(&line, "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f", at[0], at[1], at[2], move[0],
@@ -178,6 +194,7 @@ static void print_rows(const supine_deformation *moved, const supine_basis *basi
     }
     supine_csv_end_row(&line);
   }
+  return supine_output_commit(&output, error);
 }
 
 /* Shift a row by the mean deviation of a sample at the vertices `order` [count]. */
@@ -189,17 +206,15 @@ static void deviate(const float *deviation, const size_t *order, size_t count, s
   supine_options_target_shift(row, back);
 }
 
-/* Write a CSV file with a row for each structure, or for each vertex if `each` is true. */
+/* Write where each structure is, or each vertex if `each` is true, as CSV or markups. */
 static supine_status write_points(const char *path, const supine_basis *basis,
                                   const supine_deformation *moved, bool each, supine_error *error) {
   const supine_pose *const pose[2] = {&moved->from.pose, &moved->pose};
   SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_options_targets_free) supine_target *rows = NULL;
-  supine_output output;
   SUPINE_TRY(supine_options_names_open(basis, &names, error));
   const size_t count = each ? supine_basis_get_info(basis)->vertex_count : names.count;
   SUPINE_TRY(supine_options_targets_find(basis, &names, pose, &moved->errors, each, &rows, error));
-  SUPINE_TRY(supine_output_open(path, &output, error));
   if (moved->subtract_hilum) {
     for (size_t i = 0; i < count; ++i) {
       supine_options_target_shift(&rows[i], moved->hilum.move);
@@ -217,10 +232,17 @@ static supine_status write_points(const char *path, const supine_basis *basis,
       deviate(moved->deviation, names.order + first, last - first, &rows[i]);
     }
   }
-  print_rows(moved, basis, rows, count, output.file);
-  SUPINE_TRY(supine_output_commit(&output, error));
   char state[160];
   (void)supine_state_describe(&moved->state, state, sizeof state);
+  if (supine_options_markups_named(path)) {
+    json_t *lists = json_array();
+    char meaning[256 + SUPINE_CAVEATS_SIZE];
+    print_meaning(moved, basis, meaning, sizeof meaning);
+    (void)json_array_append_new(lists, supine_options_markup(state, meaning, rows, count));
+    SUPINE_TRY(supine_options_markups_write(path, lists, error));
+  } else {
+    SUPINE_TRY(write_rows(path, moved, basis, rows, count, error));
+  }
   supine_options_line("%s: %zu %s%s, %s, displacement from %s\n", path, count,
                       each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
   supine_options_add(json_pack("{s:o, s:I, s:s, s:s}", "file", supine_options_json_text(path),
@@ -655,7 +677,7 @@ supine_status supine_command_deform_content(const supine_deform_content *wanted,
     SUPINE_TRY(move_grid(wanted, basis, moved, error));
   }
   if (!image && wanted->path != NULL) {
-    if (supine_text_ends_in(wanted->path, ".csv")) {
+    if (supine_text_ends_in(wanted->path, ".csv") || supine_options_markups_named(wanted->path)) {
       SUPINE_TRY(write_points(wanted->path, basis, moved, wanted->vertices, error));
     } else {
       SUPINE_TRY(write_surface(wanted->path, basis, moved, error));

@@ -12,10 +12,13 @@
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
+#include "program/options/markups.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
 
 static const char name[] = "locate";
+
+#define MEANING "mm, in the frame of the observations; expected_error_mm: " SUPINE_EXPECTED_MEANING
 
 typedef struct request {
   const char *output, *points;
@@ -30,10 +33,11 @@ static const supine_option table[] = {
     {"points", 0, "FILE", "positions of the points in the scan, made by 'supine embed BASIS'",
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN, .required = true},
     {"output", 'o', "FILE",
-     ".vtp or .ply: the surface of the lungs; .csv: all structures in the file of --points. "
+     ".vtp or .ply: the surface of the lungs; .csv, or " SUPINE_MARKUPS_ENDING
+     " of 3D Slicer: all structures in the file of --points. "
      "Positions are in the frame of the observations, and each has its expected error",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
-     .endings = ".vtp, .ply or .csv"},
+     .endings = ".vtp, .ply, .csv or " SUPINE_MARKUPS_ENDING},
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP ". By default, it is fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
@@ -179,17 +183,40 @@ static void print(const request *wanted, const supine_options_names *names,
       best->residual_rms, "outliers", outliers_of(names, observed, located->residuals)));
 }
 
+/* Write control points of 3D Slicer. */
+static supine_status write_markups(const char *path, const supine_options_names *names, size_t n,
+                                   const supine_posed_located *located, supine_error *error) {
+  SUPINE_ARENA arena = {0};
+  supine_target *points = supine_arena_take(&arena, n, sizeof *points);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu points", n));
+  for (size_t i = 0; i < n; ++i) {
+    const size_t at = names->order[i];
+    points[i] = (supine_target){.name = names->text[names->part[at]],
+                                .moved = NAN,
+                                .moved_error = NAN,
+                                .error = (double)located->sigma[at],
+                                .another_error = NAN};
+    for (size_t k = 0; k < 3; ++k) {
+      points[i].at[k] = (double)located->xyz[3 * at + k];
+    }
+  }
+  json_t *lists = json_array();
+  (void)json_array_append_new(lists, supine_options_markup("located", MEANING, points, n));
+  return supine_options_markups_write(path, lists, error);
+}
+
 /* Print first and write last, so that a failure leaves no file. */
 static supine_status finish_points(const request *wanted, const supine_basis *inside,
                                    const supine_options_names *names, const observations *observed,
                                    const supine_posed_located *located, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(inside);
   print(wanted, names, observed, info->vertex_count, located->best->volume, located);
+  if (supine_options_markups_named(wanted->output)) {
+    return write_markups(wanted->output, names, info->vertex_count, located, error);
+  }
   supine_output output = {0};
   SUPINE_TRY(supine_output_open(wanted->output, &output, error));
-  (void)fputs("# mm, in the frame of the observations; expected_error_mm: " SUPINE_EXPECTED_MEANING
-              "\nname,lung,x,y,z,expected_error_mm\n",
-              output.file);
+  (void)fputs("# " MEANING "\nname,lung,x,y,z,expected_error_mm\n", output.file);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     const size_t at = names->order[i];
     const float *p = located->xyz + 3 * at;
@@ -229,7 +256,8 @@ static supine_status finish_surface(const request *wanted, const supine_basis *l
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   enum { OUTLIER_POINTS = 5 }; /* supine_locate leaves out at most a fifth of the points */
   request *wanted = chosen;
-  const bool csv = supine_text_ends_in(wanted->output, ".csv");
+  const bool points =
+      supine_text_ends_in(wanted->output, ".csv") || supine_options_markups_named(wanted->output);
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *lungs = NULL;
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
   SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
@@ -244,8 +272,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   SUPINE_TRY(load_observed(given->operand[1], wanted, &names, &observed, error));
   const supine_locate_task task = {inside,        observed.count, observed.points,
                                    wanted->state, wanted->rigid,  wanted->depth};
-  const supine_status status =
-      supine_posed_locate(&task, wanted->orientation.given, csv ? inside : lungs, &located, error);
+  const supine_status status = supine_posed_locate(&task, wanted->orientation.given,
+                                                   points ? inside : lungs, &located, error);
   if (status == SUPINE_ERROR_ARGUMENT && wanted->rigid) {
     /* Report a format error: the points in the file do not determine a rotation. */
     return error->status = SUPINE_ERROR_FORMAT;
@@ -259,8 +287,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     supine_options_note(name, "with fewer than %d points, a wrong one cannot be found: check them",
                         (int)OUTLIER_POINTS);
   }
-  return csv ? finish_points(wanted, inside, &names, &observed, &located, error)
-             : finish_surface(wanted, lungs, &names, &observed, &located, error);
+  return points ? finish_points(wanted, inside, &names, &observed, &located, error)
+                : finish_surface(wanted, lungs, &names, &observed, &located, error);
 }
 
 const supine_command supine_command_locate = {

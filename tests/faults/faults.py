@@ -70,6 +70,7 @@ deform lungs.safetensors --posture prone --samples 2 -o out/a.safetensors
 compare lungs.safetensors --postures supine,prone
 compare lungs.safetensors --postures supine,prone --json
 compare lungs.safetensors --postures supine,prone -o out/a.html
+compare lungs.safetensors --inside points.safetensors --postures supine,prone -o out/a.mrk.json
 compare points.safetensors --postures supine,prone
 breathe lungs.safetensors --posture prone --fps 1 -o out/a.vtp
 breathe lungs.safetensors --turn supine:left:1s --fps 2 --pv patient.pv.json -o out/a.safetensors
