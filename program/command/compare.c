@@ -85,6 +85,9 @@ static const supine_option table[] = {
      "structure of --inside, in mm and LPS, with the errors as measurements",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT,
      .endings = ".html, .csv or " SUPINE_MARKUPS_ENDING},
+    {"title", 0, "TEXT",
+     "title of the report, such as the patient's name; default the name of the basis file",
+     SUPINE_FILLS(request, comparison.title)},
     {.name = NULL}};
 
 /* Append a structure to the list of targets or of anatomy. */

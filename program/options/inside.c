@@ -342,7 +342,7 @@ static void add_label(const appearance *look, const supine_target *t, supine_opt
   middle->tint = look->tint;
   middle->moved =
       t->moved > t->moved_error || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
-  middle->expected = t->error > 0.0 && t->moved >= 0.05 ? (float)t->error : 0.0F;
+  middle->expected = t->moved_error > 0.0 && t->moved >= 0.05 ? (float)t->moved_error : 0.0F;
 }
 
 /* Make the marks of a structure: of its vertices, and of its middle, which has the label. */

@@ -41,6 +41,7 @@ typedef struct supine_compared_posture {
 typedef struct supine_comparison {
   const char *path;             /* path of the basis file */
   const char *made_by;          /* command line, which the report prints */
+  const char *title;            /* of the report; NULL for the name of the basis file */
   supine_volume_options volume; /* its state is supine, at the volume of postures that name none */
   supine_from from;
   double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
@@ -88,8 +89,9 @@ void supine_report_table(const supine_comparison *comparison, FILE *file);
 supine_status supine_report_html(const supine_comparison *comparison, FILE *file,
                                  supine_error *error);
 
-/* Return the colour of a posture's line in charts. */
-const char *supine_report_line(size_t posture);
+/* Return the name of a posture, and the colour and the dashes of its lines in charts: no two of the
+ * first twelve postures have both in common, and colours of like lightness have other dashes. */
+json_t *supine_report_line(const supine_comparison *comparison, size_t posture);
 
 /* Return the values of the tags of report.html that have these names. */
 json_t *supine_report_findings(const supine_comparison *comparison);

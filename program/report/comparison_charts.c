@@ -6,11 +6,11 @@
 #include "program/report/comparison.h"
 #include "program/view/render/render.h"
 
-/* These colours can be told apart with any colour vision (M. Okabe and K. Ito, 2008). */
-const char *supine_report_line(size_t posture) {
-  static const char *const lines[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                      "#56b4e9", "#e69f00", "#8c8c8c"};
-  return lines[posture % (sizeof lines / sizeof *lines)];
+json_t *supine_report_line(const supine_comparison *c, size_t posture) {
+  static const char *const dashes[] = {"none", "7 3", "2 3", "9 3 2 3"}; /* as stroke-dasharray */
+  return json_pack("{s:s, s:o, s:s}", "name", c->posture[posture].label, "line",
+                   json_sprintf("#%06x", supine_render_palette(SUPINE_PALETTE_POSTURES, posture)),
+                   "dash", dashes[posture % (sizeof dashes / sizeof *dashes)]);
 }
 
 /* Return the regional expansion of a slab, %. */
@@ -61,9 +61,9 @@ json_t *supine_report_profile(const supine_comparison *c) {
                           "y", json_sprintf("%.1f", down(95.0 - 10.0 * (double)s)), "value",
                           json_sprintf("%.2f", value)));
     }
-    (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:b, s:o}", "line",
-                                                 supine_report_line(i), "name", c->posture[i].label,
-                                                 "dashed", (int)(i >= 7), "dots", dots));
+    json_t *line = supine_report_line(c, i);
+    (void)json_object_set_new(line, "dots", dots);
+    (void)json_array_append_new(lines, line);
   }
   return json_pack("{s:s, s:o, s:o}", "axis", "regional expansion, %", "ticks", ticks, "lines",
                    lines);

@@ -161,18 +161,17 @@ json_t *supine_report_postures(const supine_comparison *c) {
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_compared_posture *p = &c->posture[i];
     const double ratio = lowest_over_uppermost(c, i); /* NaN if no breath is computed */
-    (void)json_array_append_new(
-        list, json_pack("{s:s, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:s*, s:o}", "name", p->label,
-                        "line", supine_report_line(i), "held", make_lungs(c, i), "mean",
-                        json_sprintf("%.1f", p->displacement.mean), "max",
-                        json_sprintf("%.1f", p->displacement.max), "error",
-                        p->moved_error > 0 ? json_sprintf("%.1f", p->moved_error) : json_string(""),
-                        "place",
-                        c->has_errors ? json_sprintf("%.1f", p->expected_error) : json_string(""),
-                        "another",
-                        c->has_errors ? json_sprintf("%.1f", p->another_error) : json_string(""),
-                        "ratio_mark", mark_of(c, i, "ratio"), "ratio",
-                        isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio)));
+    json_t *row = json_pack(
+        "{s:o, s:o, s:o, s:o, s:o, s:o, s:s*, s:o}", "held", make_lungs(c, i), "mean",
+        json_sprintf("%.1f", p->displacement.mean), "max",
+        json_sprintf("%.1f", p->displacement.max), "error",
+        p->moved_error > 0 ? json_sprintf("%.1f", p->moved_error) : json_string(""), "place",
+        c->has_errors ? json_sprintf("%.1f", p->expected_error) : json_string(""), "another",
+        c->has_errors ? json_sprintf("%.1f", p->another_error) : json_string(""), "ratio_mark",
+        mark_of(c, i, "ratio"), "ratio",
+        isnan(ratio) ? json_string("") : json_sprintf("%.2f", ratio));
+    (void)json_object_update_new(row, supine_report_line(c, i));
+    (void)json_array_append_new(list, row);
   }
   return list;
 }

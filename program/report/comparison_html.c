@@ -7,6 +7,7 @@
 #include <supine/version.h>
 
 #include "base/locale.h"
+#include "base/text.h"
 #include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/report/comparison.h"
@@ -102,21 +103,28 @@ static json_t *values(const supine_comparison *c) {
   (void)supine_basis_caveats(c->basis, caveats, sizeof caveats);
   supine_options_basis_title(c->path, title, sizeof title);
   json_t *file = json_string(title);
+  if (c->title != NULL) {
+    (void)snprintf(title, sizeof title, "%.*s", (int)sizeof title - 1, c->title);
+    (void)supine_text_make_utf8(title);
+  }
+  json_t *heading = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
   json_t *today = date();
   json_t *traced = traces(c);
   return json_pack(
-      "{s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, s:s*, "
+      "{s:o, s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, "
+      "s:s*, "
       "s:s, s:o*, s:o*}",
-      "provenance", provenance(c, file, today), "file", file, "date", today, "count",
-      json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"), "volume",
-      volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count, "area",
-      json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version", SUPINE_VERSION,
-      "postures", supine_report_postures(c), "findings", supine_report_findings(c), "lungs",
-      lungs(c), "footnotes", supine_report_footnotes(c), "reference", c->reference.name, "targets",
-      matrix(c, false, "target, mm"), "traces", traced, "lobes", matrix(c, true, "structure"),
-      "meaning", c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL,
-      "caveats", caveats, "outlined", traced == NULL ? outlined(c) : NULL, "ventilation",
+      "provenance", provenance(c, file, today), "file", file, "title", heading, "date", today,
+      "count", json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
+      "volume", volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
+      "area", json_sprintf("%.0f", supine_compare_area(c->compare) / 100.0), "version",
+      SUPINE_VERSION, "postures", supine_report_postures(c), "findings", supine_report_findings(c),
+      "lungs", lungs(c), "footnotes", supine_report_footnotes(c), "reference", c->reference.name,
+      "targets", matrix(c, false, "target, mm"), "traces", traced, "lobes",
+      matrix(c, true, "structure"), "meaning",
+      c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL, "caveats",
+      caveats, "outlined", traced == NULL ? outlined(c) : NULL, "ventilation",
       c->breath > 0.0 ? json_pack("{s:o}", "profile", supine_report_profile(c)) : NULL);
 }
 

@@ -53,8 +53,7 @@ static json_t *make_table(const supine_comparison *c, bool anatomy, const size_t
   json_t *heads = json_array();
   json_t *rows = json_array();
   for (size_t i = 0; i < count; ++i) {
-    (void)json_array_append_new(heads, json_pack("{s:s, s:s}", "name", c->posture[shown[i]].label,
-                                                 "line", supine_report_line(shown[i])));
+    (void)json_array_append_new(heads, supine_report_line(c, shown[i]));
   }
   for (size_t k = 0; k < c->names.count; ++k) {
     if (c->posture[shown[0]].targets[k].anatomy == anatomy) {

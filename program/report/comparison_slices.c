@@ -35,12 +35,21 @@ static const slice planes[] = {{"axial, from the feet", 2, 0, 0, 1, 1, "LRAP"},
                                {"coronal, from the front", 1, 0, 0, 2, -1, "LRHF"},
                                {"sagittal, from the left", 0, 0, 1, 2, -1, "PAHF"}};
 
+/* A triangle that a slice crosses. Its boundary rises through the plane on one edge and falls on
+ * another, on which that of the next triangle of the outline rises. */
+typedef struct crossing {
+  uint64_t rising, falling; /* edges: the smaller index of a vertex times 2^32, plus the larger */
+  double from[2], to[2];    /* points of the rising and of the falling edge */
+  bool drawn;
+} crossing;
+
 /* The lungs in the reference pose and in each posture. */
 typedef struct shapes {
   const supine_comparison *c;
   const supine_basis_info *info;
   float *before; /* [N, 3] mm */
   float **now;   /* [postures.count][N, 3] mm */
+  crossing *met; /* [triangles] memory of trace */
   double low[3]; /* box of the lungs in all postures, mm */
   double high[3];
   supine_arena arena;
@@ -56,6 +65,7 @@ static bool find_shapes(const supine_comparison *c, shapes *s) {
   s->info = supine_basis_get_info(c->basis);
   const size_t n = s->info->vertex_count;
   s->now = supine_arena_zeros(&s->arena, c->postures.count, sizeof *s->now);
+  s->met = supine_arena_take(&s->arena, s->info->triangle_count, sizeof *s->met);
   s->before = supine_arena_take(&s->arena, n, 3 * sizeof *s->before);
   for (size_t i = 0; i < c->postures.count && !s->arena.failed; ++i) {
     s->now[i] = supine_arena_take(&s->arena, n, 3 * sizeof *s->now[i]);
@@ -91,25 +101,55 @@ static void cross(const slice *s, double at, const float *a, const float *b, dou
   project(s, xyz, point);
 }
 
-/* Print the outline as an SVG path, with a line for each triangle that the slice crosses. Return
- * the area inside the outline, mm^2. */
-static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
-                    FILE *path) {
-  double twice = 0;
-  for (size_t t = 0; t < info->triangle_count; ++t) {
-    double up[2] = {NAN, NAN}; /* point where the triangle's boundary rises through the plane */
-    double down[2] = {0, 0};
-    for (size_t i = 0; i < 3; ++i) {
-      const float *a = xyz + 3 * (size_t)info->triangles[3 * t + i];
-      const float *b = xyz + 3 * (size_t)info->triangles[3 * t + (i + 1) % 3];
-      const bool above[2] = {(double)a[s->axis] > at, (double)b[s->axis] > at};
-      if (above[0] != above[1]) {
-        cross(s, at, a, b, above[1] ? up : down);
-      }
+/* Set `met` if a slice crosses triangle `t`, and return whether it does. */
+static bool cross_triangle(const supine_basis_info *info, const slice *s, double at,
+                           const float *xyz, size_t t, crossing *met) {
+  bool crossed = false;
+  for (size_t i = 0; i < 3; ++i) {
+    const uint32_t v[2] = {info->triangles[3 * t + i], info->triangles[3 * t + (i + 1) % 3]};
+    const bool swapped = v[0] > v[1];
+    const uint64_t edge = (uint64_t)v[swapped] << 32 | v[!swapped];
+    const float *a = xyz + 3 * (size_t)v[swapped]; /* the same in both triangles of the edge */
+    const float *b = xyz + 3 * (size_t)v[!swapped];
+    const bool above[2] = {(double)xyz[3 * (size_t)v[0] + s->axis] > at,
+                           (double)xyz[3 * (size_t)v[1] + s->axis] > at};
+    if (above[0] != above[1]) {
+      cross(s, at, a, b, above[1] ? met->from : met->to);
+      *(above[1] ? &met->rising : &met->falling) = edge;
+      crossed = true;
     }
-    if (!isnan(up[0])) {
-      twice += up[0] * down[1] - down[0] * up[1];
-      (void)supine_print(path, "M%.1f %.1fL%.1f %.1f", up[0], up[1], down[0], down[1]);
+  }
+  return crossed;
+}
+
+static int by_rising(const void *a, const void *b) {
+  const uint64_t p = ((const crossing *)a)->rising;
+  const uint64_t q = ((const crossing *)b)->rising;
+  return (p > q) - (p < q);
+}
+
+/* Print the outline as an SVG path of closed lines. Return the area inside, mm^2.
+ * @param met  memory for a crossing of each triangle */
+static double trace(const supine_basis_info *info, const slice *s, double at, const float *xyz,
+                    crossing *met, FILE *path) {
+  double twice = 0.0;
+  size_t count = 0;
+  for (size_t t = 0; t < info->triangle_count; ++t) {
+    met[count] = (crossing){.drawn = false};
+    count += cross_triangle(info, s, at, xyz, t, &met[count]);
+  }
+  qsort(met, count, sizeof *met, by_rising);
+  for (size_t i = 0; i < count; ++i) {
+    crossing *next = &met[i];
+    if (!next->drawn) {
+      (void)supine_print(path, "M%.1f %.1f", next->from[0], next->from[1]);
+    }
+    while (next != NULL && !next->drawn) {
+      const crossing key = {.rising = next->falling};
+      next->drawn = true;
+      twice += next->from[0] * next->to[1] - next->to[0] * next->from[1];
+      (void)supine_print(path, "L%.1f %.1f", next->to[0], next->to[1]);
+      next = bsearch(&key, met, count, sizeof *met, by_rising);
     }
   }
   return fabs(twice) / 2;
@@ -124,7 +164,7 @@ static json_t *outline(const shapes *of, const slice *s, double at, const float 
   if (path == NULL) {
     return json_string("");
   }
-  *area = trace(of->info, s, at, xyz, path);
+  *area = trace(of->info, s, at, xyz, of->met, path);
   json_t *made = fclose(path) == 0 ? json_string(text) : json_string("");
   free(text);
   return made;
@@ -149,12 +189,13 @@ static json_t *chart(const shapes *of, const slice *s, double at, double *before
   json_t *lines = json_array();
   for (size_t i = 0; i < of->c->postures.count; ++i) {
     if (!supine_report_is_reference(of->c, i)) {
-      json_t *own = outline(of, s, at, of->now[i], &area[i]);
-      (void)json_array_append_new(lines, json_pack("{s:s, s:s, s:o}", "line", supine_report_line(i),
-                                                   "name", of->c->posture[i].label, "path", own));
+      json_t *line = supine_report_line(of->c, i);
+      (void)json_object_set_new(line, "path", outline(of, s, at, of->now[i], &area[i]));
+      (void)json_array_append_new(lines, line);
     }
   }
-  return json_pack("{s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "box",
+  return json_pack("{s:f, s:o, s:o, s:o, s:o, s:[o, o, o, o]}", "wide", right - left + 2 * MARGIN,
+                   "box",
                    json_sprintf("%.0f %.0f %.0f %.0f", left - MARGIN, top - MARGIN,
                                 right - left + 2 * MARGIN, bottom - top + 2 * MARGIN + 10),
                    "before", path, "lines", lines, "mark",
@@ -183,6 +224,26 @@ static json_t *area_title(const supine_comparison *c, const slice *s, double bef
   return title;
 }
 
+/* Set for each chart the width that it has beside the others, and below them, %: all are drawn at
+ * one scale. */
+static void set_widths(json_t *charts) {
+  SUPINE_C_LOCALE;
+  double sum = 0.0;
+  double most = 0.0;
+  size_t i;
+  json_t *made;
+  json_array_foreach(charts, i, made) {
+    const double wide = json_real_value(json_object_get(made, "wide"));
+    sum += wide;
+    most = fmax(most, wide);
+  }
+  json_array_foreach(charts, i, made) {
+    const double wide = json_real_value(json_object_get(made, "wide"));
+    (void)json_object_set_new(made, "part", json_sprintf("%.2f", 100.0 * wide / sum));
+    (void)json_object_set_new(made, "share", json_sprintf("%.2f", 100.0 * wide / most));
+  }
+}
+
 json_t *supine_report_outlines(const supine_comparison *c) {
   SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
   json_t *list = json_array();
@@ -201,25 +262,32 @@ json_t *supine_report_outlines(const supine_comparison *c) {
     (void)json_object_set_new(made, "title", area_title(c, s, before, area));
     (void)json_array_append_new(list, made);
   }
+  set_widths(list);
   return list;
 }
 
-/* Add to the chart of a plane where target `k` was, and a dot where it is in each posture. */
+/* Add to the chart of a plane where target `k` was, and for each posture a dot where it is and a
+ * ring of the expected error of its displacement. Later dots are smaller, so that none hides
+ * another. */
 static void add_target(const supine_comparison *c, const slice *s, size_t k, const double was[3],
                        json_t *made) {
   SUPINE_C_LOCALE;
   double from[2];
   json_t *dots = json_array();
+  double radius = 6.5; /* mm */
   project(s, was, from);
   for (size_t i = 0; i < c->postures.count; ++i) {
     if (!supine_report_is_reference(c, i)) {
       double to[2];
       project(s, c->posture[i].targets[k].at, to);
-      (void)json_array_append_new(
-          dots, json_pack("{s:o, s:o, s:o, s:s, s:s}", "x", json_sprintf("%.1f", to[0]), "y",
-                          json_sprintf("%.1f", to[1]), "way",
-                          json_sprintf("M%.1f %.1fL%.1f %.1f", from[0], from[1], to[0], to[1]),
-                          "line", supine_report_line(i), "name", c->posture[i].label));
+      const double error = c->posture[i].targets[k].moved_error;
+      json_t *dot = json_pack("{s:o, s:o, s:o, s:o, s:o}", "x", json_sprintf("%.1f", to[0]), "y",
+                              json_sprintf("%.1f", to[1]), "r", json_sprintf("%.1f", radius), "way",
+                              json_sprintf("M%.1f %.1fL%.1f %.1f", from[0], from[1], to[0], to[1]),
+                              "ring", json_sprintf("%.1f", error > 0.0 ? error : 0.0));
+      (void)json_object_update_new(dot, supine_report_line(c, i));
+      (void)json_array_append_new(dots, dot);
+      radius *= 0.75;
     }
   }
   (void)json_object_set_new(made, "title", json_string(s->name));
@@ -242,6 +310,7 @@ static json_t *target_charts(const shapes *of, size_t k, double *area) {
     add_target(of->c, &planes[i], k, was, made);
     (void)json_array_append_new(charts, made);
   }
+  set_widths(charts);
   return json_pack("{s:s, s:o}", "name", of->c->names.text[k], "outlines", charts);
 }
 

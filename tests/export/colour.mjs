@@ -4,7 +4,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { folder, supine } from './support.mjs';
+import { folder, oklab, supine } from './support.mjs';
 
 supine('phantom', '-o', join(folder, 'lungs.ply'), '--vertices', '200');
 supine('precompute', join(folder, 'lungs.ply'), '-o', join(folder, 'lungs.safetensors'));
@@ -15,21 +15,6 @@ const { colours } = JSON.parse(page.match(/<data id="basis" hidden>(.*?)<\/data>
 const code = readFileSync(new URL('../../program/view/page/colour.js', import.meta.url), 'utf8');
 const { tickStep, rangeEnd } = new Function(`${code}
   return { tickStep, rangeEnd };`)();
-
-/** Return the OKLab colour of sRGB bytes. */
-function oklab(bytes) {
-  const [r, g, b] = Array.from(bytes, (x) =>
-    x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4,
-  );
-  const l = Math.cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
-  const m = Math.cbrt(0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b);
-  const s = Math.cbrt(0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b);
-  return [
-    0.2104542553 * l + 0.793617785 * m - 0.0040720468 * s,
-    1.9779984951 * l - 2.428592205 * m + 0.4505937099 * s,
-    0.0259040371 * l + 0.7827717662 * m - 0.808675766 * s,
-  ];
-}
 
 for (const name of ['displacement', 'difference']) {
   const bytes = Buffer.from(colours[name], 'hex');

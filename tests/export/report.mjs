@@ -7,7 +7,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, open } from './browser.mjs';
 import { basis } from './lungs.mjs';
-import { folder, skip, supine } from './support.mjs';
+import { folder, oklab, skip, supine } from './support.mjs';
 
 try {
   execFileSync('pdftotext', ['-v'], { stdio: 'ignore' });
@@ -161,14 +161,18 @@ moved.forEach(({ targets }, i) => {
     assert.equal(words === `within its error of ${error.toFixed(1)}`, mm <= error, `${name}: ${words}`);
   }
 });
-/* Three planes show where each target was, and a dot for each posture where it is. */
+/* Three planes show where each target was, and for each posture a dot where it is, in a ring of the expected error of
+ * its displacement. All have one scale, and no dot hides another. */
 const traced = await page.evaluate(() =>
   [...document.querySelectorAll('.thirds figure')].map((figure) => ({
+    scale: figure.querySelector('svg').getScreenCTM().a,
+    rings: [...figure.querySelectorAll('.ring')].map((ring) => Number(ring.getAttribute('r'))),
+    radii: [...figure.querySelectorAll('circle:not(.was, .ring)')].map((dot) => Number(dot.getAttribute('r'))),
     title: figure.querySelector('figcaption').textContent,
-    dots: figure.querySelectorAll('circle:not(.was)').length,
+    dots: figure.querySelectorAll('circle:not(.was, .ring)').length,
     was: ['cx', 'cy'].map((at) => Number(figure.querySelector('.was').getAttribute(at))),
     at: Object.fromEntries(
-      [...figure.querySelectorAll('circle:not(.was)')].map((dot) => [
+      [...figure.querySelectorAll('circle:not(.was, .ring)')].map((dot) => [
         dot.textContent,
         ['cx', 'cy'].map((at) => Number(dot.getAttribute(at))),
       ]),
@@ -179,12 +183,31 @@ assert.deepEqual(
   traced.map(({ title }) => title.split(',')[0]),
   ['axial', 'coronal', 'sagittal', 'axial', 'coronal', 'sagittal'],
 );
+for (const { title, scale, radii } of traced) {
+  assert.ok(Math.abs(scale / traced[0].scale - 1) < 0.01, `${title}: ${scale}, not ${traced[0].scale} pixels per mm`);
+  assert.ok(radii.every((r, i) => i === 0 || r < radii[i - 1]), `${title}: ${radii}`);
+}
+/* Lines of two postures differ in their dashes, or in lightness: colours alone tell nothing. */
+const lines = await page.evaluate(() =>
+  [...document.querySelectorAll('.thirds figure')[0].querySelectorAll('path[stroke-dasharray]')].map((line) => ({
+    dash: line.getAttribute('stroke-dasharray'),
+    colour: line.getAttribute('stroke'),
+  })),
+);
+const lightness = ({ colour }) => oklab(Buffer.from(colour.slice(1), 'hex'))[0];
+assert.equal(lines.length, postures.length);
+lines.forEach((a, i) =>
+  lines.slice(i + 1).forEach((b) =>
+    assert.ok(a.dash !== b.dash || Math.abs(lightness(a) - lightness(b)) > 0.05, JSON.stringify([a, b])),
+  ),
+);
 const PLANES = { axial: (x) => [x[0], x[1]], coronal: (x) => [x[0], -x[2]], sagittal: (x) => [x[1], -x[2]] };
 ['nodule', 'mark'].forEach((name, k) =>
   moved.forEach(({ targets }, i) => {
-    const { move } = targets.find((target) => target.name === name);
-    for (const { title, was, at, dots } of traced.slice(3 * k, 3 * k + 3)) {
+    const { move, moved_error_mm: error } = targets.find((target) => target.name === name);
+    for (const { title, was, at, dots, rings } of traced.slice(3 * k, 3 * k + 3)) {
       assert.equal(dots, postures.length);
+      assert.ok(Math.abs(rings[i] - error) <= 0.051, `${name}, ${title}: ring of ${rings[i]}, not ${error} mm`);
       const seen = at[summary[i][0]].map((x, axis) => x - was[axis]);
       PLANES[title.split(',')[0]](move).forEach((x, axis) =>
         assert.ok(Math.abs(x - seen[axis]) < 0.11, `${name}, ${title}: ${seen}, not ${x}`),
@@ -276,7 +299,8 @@ assert.equal(outlines.length, 4);
 for (const { title, paths } of outlines) {
   const area = Object.fromEntries(
     paths.map(([name, d]) => {
-      const lines = [...d.matchAll(/M(\S+) ([^L]+)L(\S+) ([^M]+)/g)].map((found) => found.slice(1).map(Number));
+      const rings = d.split('M').map((ring) => ring.split('L').map((point) => point.split(' ').map(Number)));
+      const lines = rings.flatMap((ring) => ring.slice(1).map((end, i) => [...ring[i], ...end]));
       return [name, Math.abs(lines.reduce((sum, [x, y, u, v]) => sum + (x * v - u * y) / 2, 0))];
     }),
   );

@@ -60,13 +60,13 @@ double supine_render_bar_end(double value) {
 }
 
 uint32_t supine_render_palette(supine_palette palette, size_t i) {
-  enum { POSTURES = 7, TARGETS = 2 };
+  enum { POSTURES = 6, TARGETS = 2 };
   static const uint32_t targets[TARGETS] = {0x66bdc2, 0xfa7d33};
   static const uint32_t anatomy[SUPINE_RENDER_TINTS] = {0x4f8ae0, 0xa670e0, 0x3f9d63,
                                                         0xb08a1e, 0xd0587e, 0x7a8797};
   /* [OkabeIto2008] M. Okabe and K. Ito, "Color Universal Design". */
-  static const uint32_t postures[POSTURES] = {0x0072b2, 0xd55e00, 0x009e73, 0xcc79a7,
-                                              0x56b4e9, 0xe69f00, 0x8c8c8c};
+  static const uint32_t postures[POSTURES] = {0x0072b2, 0xd55e00, 0x009e73,
+                                              0xcc79a7, 0x56b4e9, 0xe69f00};
   switch (palette) {
   case SUPINE_PALETTE_TARGETS:
     return targets[i % TARGETS];

@@ -94,7 +94,8 @@ typedef struct supine_mark {
   bool moved;            /**< whether its structure is elsewhere than it was */
   const char *label;     /**< text written beside the mark, or NULL */
   float reach;           /**< of a mark with a label, radius of its structure, mm */
-  float expected;        /**< of a mark with a label, expected error, mm; 0: no ring is drawn */
+  float expected;        /**< of a mark with a label, expected error of its displacement, mm;
+                            0: no ring is drawn */
 } supine_mark;
 
 typedef struct supine_marks {
