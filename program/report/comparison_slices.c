@@ -113,10 +113,13 @@ static bool cross_triangle(const supine_basis_info *info, const slice *s, double
     const float *b = xyz + 3 * (size_t)v[!swapped];
     const bool above[2] = {(double)xyz[3 * (size_t)v[0] + s->axis] > at,
                            (double)xyz[3 * (size_t)v[1] + s->axis] > at};
-    if (above[0] != above[1]) {
-      cross(s, at, a, b, above[1] ? met->from : met->to);
-      *(above[1] ? &met->rising : &met->falling) = edge;
+    if (above[1] && !above[0]) {
+      cross(s, at, a, b, met->from);
+      met->rising = edge;
       crossed = true;
+    } else if (above[0] && !above[1]) {
+      cross(s, at, a, b, met->to);
+      met->falling = edge;
     }
   }
   return crossed;

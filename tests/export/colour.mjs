@@ -10,11 +10,22 @@ supine('phantom', '-o', join(folder, 'lungs.ply'), '--vertices', '200');
 supine('precompute', join(folder, 'lungs.ply'), '-o', join(folder, 'lungs.safetensors'));
 supine('export', join(folder, 'lungs.safetensors'), '-o', join(folder, 'lungs.html'));
 const page = readFileSync(join(folder, 'lungs.html'), 'utf8');
-const { colours } = JSON.parse(page.match(/<data id="basis" hidden>(.*?)<\/data>/)[1].replaceAll('&quot;', '"'));
+const data = page.match(/<data id="basis" hidden>(.*?)<\/data>/)[1].replaceAll('&quot;', '"');
+const { anatomyColours, colours } = JSON.parse(data);
 
 const code = readFileSync(new URL('../../program/view/page/colour.js', import.meta.url), 'utf8');
 const { tickStep, rangeEnd } = new Function(`${code}
   return { tickStep, rangeEnd };`)();
+
+/* Lobes that touch differ in lightness: the left two, and the right three, in the order of their names. */
+const lightness = anatomyColours.map((colour) => oklab(Buffer.from(colour.slice(1), 'hex'))[0]);
+for (const [a, b] of [
+  [0, 1],
+  [2, 3],
+  [3, 4],
+  [2, 4],
+])
+  assert.ok(Math.abs(lightness[a] - lightness[b]) > 0.05, `${anatomyColours[a]}, ${anatomyColours[b]}`);
 
 for (const name of ['displacement', 'difference']) {
   const bytes = Buffer.from(colours[name], 'hex');

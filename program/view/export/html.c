@@ -317,6 +317,16 @@ static json_t *describe_surface(const page *p) {
       supine_options_json_numbers(info->lung_count, info->reference_volume));
 }
 
+/* Return the colours of anatomy that the page takes, as pictures do. */
+static json_t *anatomy_colours(void) {
+  json_t *list = json_array();
+  for (size_t i = 0; i < SUPINE_RENDER_TINTS; ++i) {
+    (void)json_array_append_new(
+        list, json_sprintf("#%06x", supine_render_palette(SUPINE_PALETTE_ANATOMY, i)));
+  }
+  return list;
+}
+
 /* Return the outline of the torso that the page draws, as pictures do. */
 static json_t *describe_torso(void) {
   json_t *list = json_array();
@@ -328,11 +338,11 @@ static json_t *describe_torso(void) {
 
 static json_t *describe(const page *p) {
   json_t *text = describe_surface(p);
-  json_t *more = json_pack("{s:o, s:f, s:o, s:o, s:o, s:o, s:o}", "colours", colours(),
-                           "breathVolume", p->shown->breath, "outline", describe_torso(),
-                           "metadata", supine_options_json_metadata(p->basis), "title",
-                           supine_options_json_text(p->shown->title), "inside", describe_inside(p),
-                           "froms", describe_froms(p));
+  json_t *more = json_pack(
+      "{s:o, s:o, s:f, s:o, s:o, s:o, s:o, s:o}", "anatomyColours", anatomy_colours(), "colours",
+      colours(), "breathVolume", p->shown->breath, "outline", describe_torso(), "metadata",
+      supine_options_json_metadata(p->basis), "title", supine_options_json_text(p->shown->title),
+      "inside", describe_inside(p), "froms", describe_froms(p));
   (void)json_object_update_missing(text, more);
   json_decref(more);
   return text;

@@ -214,6 +214,7 @@ function findBoxes(basis) {
 /** Read the lungs from the page, and open them with the run-time library. */
 async function readBasis() {
   const basis = JSON.parse(document.getElementById('basis').textContent);
+  ANATOMY_COLOURS.push(...basis.anatomyColours);
   for (const [name, text] of Object.entries(basis.colours)) basis.colours[name] = readColours(text);
   const plain = new Uint8Array(1024).map((_, i) => [184, 196, 212, 255][i % 4]);
   Object.assign(basis.colours, { expansion: divergingMap(), plain });

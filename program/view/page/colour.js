@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Compute colours, and ranges and ticks of colour bars, by the same rules as 'supine render' and 'supine compare'.
 
-/** Colours of anatomy, large structures such as lobes and airways, in turn. They differ from those of targets. */
-const ANATOMY_COLOURS = ['#4f8ae0', '#a670e0', '#3f9d63', '#b08a1e', '#d0587e', '#7a8797'];
+/** Colours of anatomy, large structures such as lobes and airways, in turn: those of pictures, which readBasis finds in
+ * the page. */
+const ANATOMY_COLOURS = [];
 
 /** Return the interval between the ticks of a scale that ends at `value`: a round number, 1/10 to 1/4 of `value`. */
 function tickStep(value) {

@@ -6,7 +6,7 @@
 const ARROWS_SHOWN = 500;
 const FRAME_TEXELS = 6; // of the frame of a cluster (supine_gl_frames)
 const WIDTH = 2048; // width of the textures that hold lists, texels
-const CONTENT_COLOURS = 2 + ANATOMY_COLOURS.length; // of targets, of the chosen one, and of anatomy
+const contentColours = () => 2 + ANATOMY_COLOURS.length; // of targets, of the chosen one, and of anatomy
 
 class Deformer extends Device {
   /** Return what capture() needs to deform vertices: the shader program, a texture of their coefficients, [axes,
@@ -137,7 +137,7 @@ class Deformer extends Device {
       for (let j = 0; j < sides; ++j)
         ball.push(...at(i, j), ...at(i + 1, j), ...at(i + 1, j + 1), ...at(i, j), ...at(i + 1, j + 1), ...at(i, j + 1));
     this.ball = { buffer: this.buffer(new Float32Array(ball)), count: ball.length / 3 };
-    this.targetMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, CONTENT_COLOURS, 1, null);
+    this.targetMap = this.texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, contentColours(), 1, null);
   }
 
   /** Make the buffers of the deformed surface: positions, and normals with areas, four floats each. */

@@ -199,7 +199,7 @@ class Surfaces extends Deformer {
       0,
       0,
       0,
-      CONTENT_COLOURS,
+      contentColours(),
       1,
       gl.RGBA,
       gl.UNSIGNED_BYTE,
@@ -207,7 +207,7 @@ class Surfaces extends Deformer {
     );
     gl.uniform4fv(content.at.cut, NO_CUT); // only the lungs are cut
     gl.uniform1f(content.at.chosen, pane.chosen);
-    gl.uniform2f(content.at.range, 0, CONTENT_COLOURS - 1);
+    gl.uniform2f(content.at.range, 0, contentColours() - 1);
     gl.uniform1f(content.at.tint, -1);
     gl.uniform1f(content.at.spacing, 0);
     gl.uniform1f(content.at.dark, pane.dark ? 1 : 0);

@@ -61,9 +61,9 @@ double supine_render_bar_end(double value) {
 
 uint32_t supine_render_palette(supine_palette palette, size_t i) {
   enum { POSTURES = 6, TARGETS = 2 };
-  static const uint32_t targets[TARGETS] = {0x66bdc2, 0xfa7d33};
-  static const uint32_t anatomy[SUPINE_RENDER_TINTS] = {0x4f8ae0, 0xa670e0, 0x3f9d63,
-                                                        0xb08a1e, 0xd0587e, 0x7a8797};
+  static const uint32_t targets[TARGETS] = {0x8edadf, 0xfa7d33};
+  static const uint32_t anatomy[SUPINE_RENDER_TINTS] = {0x3f78d8, 0xb993f0, 0x2f8254,
+                                                        0xd0ac3c, 0xd0587e, 0x9aa6b3};
   /* [OkabeIto2008] M. Okabe and K. Ito, "Color Universal Design". */
   static const uint32_t postures[POSTURES] = {0x0072b2, 0xd55e00, 0x009e73,
                                               0xcc79a7, 0x56b4e9, 0xe69f00};
