@@ -130,6 +130,26 @@ double supine_image_plane_distance(const supine_image *image, size_t axis) {
   return fabs(supine_dot(image->step[axis], normal)) / supine_length(normal);
 }
 
+bool supine_image_same_grid(const supine_image *a, const supine_image *b) {
+  if (memcmp(a->size, b->size, sizeof a->size) != 0) {
+    return false;
+  }
+  for (size_t corner = 0; corner < 8; ++corner) {
+    const size_t at[3] = {(corner & 1U) * (a->size[0] - 1), (corner >> 1 & 1U) * (a->size[1] - 1),
+                          (corner >> 2) * (a->size[2] - 1)};
+    double place[3];
+    double voxel[3];
+    supine_image_place(b, at[0] + a->size[0] * (at[1] + a->size[1] * at[2]), place);
+    supine_image_locate(a, place, voxel);
+    for (int x = 0; x < 3; ++x) {
+      if (fabs(voxel[x] - (double)at[x]) > 0.01) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
 double supine_image_cell_diagonal(const supine_image *image) {
   double longest = 0.0;
   for (unsigned signs = 0; signs < 4; ++signs) {

@@ -87,6 +87,9 @@ double supine_image_plane_distance(const supine_image *image, size_t axis);
 /** Return the longest diagonal, mm, of the cell between eight voxels. */
 double supine_image_cell_diagonal(const supine_image *image);
 
+/** Return whether two images have the same size, and corners that differ by at most 0.01 voxels. */
+bool supine_image_same_grid(const supine_image *a, const supine_image *b);
+
 /** Return whether the determinant of the steps is negative, as in a file whose axes run to the
  * left, the front and the head (LAS), which dcm2niix writes. DICOM has no such grids, and programs
  * that convert to it mirror them. */

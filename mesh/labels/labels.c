@@ -39,27 +39,6 @@ static supine_status advance(work *w, double fraction, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Return whether two images have the same size, and corners that differ by at most 0.01 voxels. */
-static bool same_frame(const supine_image *a, const supine_image *b) {
-  if (memcmp(a->size, b->size, sizeof a->size) != 0) {
-    return false;
-  }
-  for (size_t corner = 0; corner < 8; ++corner) {
-    const size_t at[3] = {(corner & 1U) * (a->size[0] - 1), (corner >> 1 & 1U) * (a->size[1] - 1),
-                          (corner >> 2) * (a->size[2] - 1)};
-    double place[3];
-    double voxel[3];
-    supine_image_place(b, at[0] + a->size[0] * (at[1] + a->size[1] * at[2]), place);
-    supine_image_locate(a, place, voxel);
-    for (int x = 0; x < 3; ++x) {
-      if (fabs(voxel[x] - (double)at[x]) > 0.01) {
-        return false;
-      }
-    }
-  }
-  return true;
-}
-
 static supine_status read_image(const work *w, const char *path, supine_image *image,
                                 supine_error *error) {
   SUPINE_TRY(supine_image_read(path, image, error));
@@ -82,7 +61,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
       supine_image_free(&image);
       SUPINE_TRY(read_image(w, paths[f], &image, error));
     }
-    SUPINE_REFUSE_IF(!same_frame(&first, &image), error, SUPINE_ERROR_FORMAT,
+    SUPINE_REFUSE_IF(!supine_image_same_grid(&first, &image), error, SUPINE_ERROR_FORMAT,
                      "%s: size, position or axes differ from %s: give masks of one scan", paths[f],
                      paths[0]);
     for (size_t i = 0; i < voxels; ++i) {

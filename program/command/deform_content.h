@@ -28,8 +28,8 @@ typedef struct supine_deform_tissue {
 } supine_deform_tissue;
 
 typedef struct supine_deform_content {
-  /* Files of -o, --field-out, --image and --labels; NULL if not given. */
-  const char *path, *field, *image, *labels;
+  /* Files of -o, --field-out, --ventilation, --image and --labels; NULL if not given. */
+  const char *path, *field, *ventilation, *image, *labels;
   const char *labels_path; /* output of --labels, if --image is given, too; or NULL */
   bool inverse, density;
   bool vertices; /* whether a CSV file has a row for each vertex */

@@ -7,6 +7,7 @@
 #include "precompute/inside/content.h"
 #include "precompute/inside/embed.h"
 #include "precompute/warp/tissue.h"
+#include "precompute/warp/ventilation.h"
 
 #include "tests/helpers/poses.h"
 
@@ -99,6 +100,66 @@ TEST(test_field_folded_counts_cells_in_lungs_and_around) {
     assert_true(share[part] > 0.5);
     assert_true(share[part] > share[1 - part]);
   }
+  supine_warp_free(&field);
+}
+
+/* Stretch the body by 1.1 along each axis: tissue everywhere takes in 1.1^3 - 1 of its volume. Two
+ * labels divide the lungs between them. */
+TEST(test_ventilation_of_stretch_is_share_and_sums_to_lungs_and_labels) {
+  supine_field field = made_field();
+  const supine_image *nodes = &field.nodes;
+  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+    double place[3];
+    supine_image_place(nodes, i, place);
+    const double u[3] = {0.1 * place[0], 0.1 * place[1], 0.1 * place[2]};
+    supine_image_put(&field.nodes, 3 * i, 3, u);
+  }
+  supine_image labels = *nodes;
+  const size_t count = labels.size[0] * labels.size[1] * labels.size[2];
+  labels.channels = 1;
+  labels.voxel = SUPINE_VOXEL_U8;
+  labels.values = malloc(count);
+  assert_non_null(labels.values);
+  for (size_t i = 0; i < count; ++i) {
+    double place[3];
+    supine_image_place(&labels, i, place);
+    supine_image_put(&labels, i, 1, (double[]){place[2] > 0.0 ? 9.0 : 4.0});
+  }
+  supine_image made;
+  supine_ventilated lungs[SUPINE_LUNGS_MAX];
+  supine_ventilated parts[SUPINE_VENTILATED_MOST];
+  size_t part_count;
+  assert_int_equal(supine_warp_ventilation(&field, &labels, &made, lungs, NULL), SUPINE_OK);
+  assert_int_equal(supine_warp_ventilated_labels(&made, &labels, parts, &part_count, NULL),
+                   SUPINE_OK);
+  const float *depth = field.depth.values;
+  const float *values = made.values;
+  for (size_t i = 0; i < count; ++i) {
+    assert_true(isnan(values[i]) == !(depth[i] > 0.0F));
+    assert_true(isnan(values[i]) || fabs((double)values[i] - 0.331) < 1e-4);
+  }
+  assert_int_equal(part_count, 2);
+  assert_true(parts[0].label == 4.0 && parts[1].label == 9.0);
+  double held = 0.0;
+  for (size_t i = 0; i < 2; ++i) {
+    assert_true(fabs(lungs[i].taken - 0.331 * lungs[i].held) < 1e-3 * lungs[i].held);
+    assert_true(fabs(parts[i].taken - 0.331 * parts[i].held) < 1e-3 * parts[i].held);
+    held += lungs[i].held - parts[i].held;
+  }
+  assert_true(lungs[0].held > 0.0 && lungs[1].held > 0.0);
+  assert_true(fabs(held) < 1e-9 * lungs[0].held);
+  supine_image wide = labels;
+  wide.voxel = SUPINE_VOXEL_F32;
+  wide.values = malloc(count * sizeof(float));
+  assert_non_null(wide.values);
+  for (size_t i = 0; i < count; ++i) {
+    ((float *)wide.values)[i] = (float)(1 + i);
+  }
+  assert_int_equal(supine_warp_ventilated_labels(&made, &wide, parts, &part_count, NULL),
+                   SUPINE_ERROR_ARGUMENT);
+  supine_image_free(&wide);
+  supine_image_free(&labels);
+  supine_image_free(&made);
   supine_warp_free(&field);
 }
 
