@@ -54,10 +54,10 @@ set_tests_properties(simulations PROPERTIES TIMEOUT ${hang})
 if(Python3_FOUND)
   add_test(NAME bids COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_bids.sh $<TARGET_FILE:supine>
     ${PROJECT_SOURCE_DIR}/cohort)
-  add_test(NAME postures COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_postures.sh $<TARGET_FILE:supine>
+  add_test(NAME cohort_refused COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_cohort_refused.sh $<TARGET_FILE:supine>
     ${PROJECT_SOURCE_DIR}/cohort)
-  set_tests_properties(bids postures PROPERTIES TIMEOUT ${hang})
-  set_tests_properties(postures PROPERTIES SKIP_RETURN_CODE 77)
+  set_tests_properties(bids cohort_refused PROPERTIES TIMEOUT ${hang})
+  set_tests_properties(cohort_refused PROPERTIES SKIP_RETURN_CODE 77)
 endif()
 add_test(NAME no_data_lost COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_no_data_lost.sh
   $<TARGET_FILE:supine>)

@@ -2,6 +2,7 @@
 /* Write the ventilation of 'supine deform', and print it for lungs and labels. */
 #include "program/command/deform_ventilation.h"
 
+#include "base/number.h"
 #include "precompute/warp/ventilation.h"
 
 /* Print what a part holds and takes in, and return it as JSON. */
@@ -37,7 +38,7 @@ static void print_labels(const supine_ventilated *parts, size_t count) {
   json_t *list = json_array();
   for (size_t i = 0; i < count; ++i) {
     char name[40];
-    (void)snprintf(name, sizeof name, "label %.9g", parts[i].label);
+    (void)supine_print_text(name, sizeof name, "label %.9g", parts[i].label);
     (void)json_array_append_new(list, print_part(name, &parts[i]));
     supine_options_line("\n");
   }
