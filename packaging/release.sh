@@ -14,7 +14,8 @@
 #     supine-<version>-py3-none-manylinux_*.whl          Python packages for x86-64 and aarch64
 #     supine-<version>.tgz                               npm package
 #     supine-<version>-binaries.spdx.json  .cdx.json     what these files contain and depend on (SPDX, CycloneDX)
-#     supine-<version>.spdx  RELEASE.md  SHA256SUMS      licences of the source files, release notes, checksums
+#     supine-<version>.spdx                              licences of the source files
+#     DEVICES.md  RELEASE.md  SHA256SUMS                 known anomalies and tests of promises, release notes, checksums
 #
 # Needed in addition to the packages of `sh cmake/debian.sh build`: python3-wheel, python3-setuptools, reuse,
 # gcc-aarch64-linux-gnu, libc6-dev-arm64-cross. Exit with 77 if a tool is missing. SUPINE_WORK names a folder that keeps the build for the next run.
@@ -140,6 +141,7 @@ tar -xzf "$out/$name.tar.gz" -C "$work/stage/source"
   sed "s|^DocumentNamespace: .*|DocumentNamespace: http://spdx.org/spdxdocs/$name-$commit|
     s|^Created: .*|Created: $(date -u -d "@$SOURCE_DATE_EPOCH" +%Y-%m-%dT%H:%M:%SZ)|" >"$out/$name.spdx"
 /usr/bin/python3 packaging/sbom.py "$out" "$version" "$commit" "$top" "$work/stage/packages"
+/usr/bin/python3 docs/devices.py . >"$out/DEVICES.md"
 awk '/^## / { ++section } section == 1' CHANGELOG.md >"$out/RELEASE.md"
 
 # Check that what was built states the version.

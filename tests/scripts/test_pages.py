@@ -2,13 +2,17 @@
 """Compare docs/model.md and docs/promises.md with the sources: test_pages.py SOURCE_FOLDER
 
 Numbers of the model that stand in a table of the page must be those of the code, each file that the page names must
-exist, and each installed header must have the stability that the page promises."""
+exist, and each installed header must have the stability that the page promises. Each promise and each row of
+docs/inputs.md must have a test."""
 import glob
 import os
 import re
 import sys
 
 source = sys.argv[1]
+sys.path.insert(0, os.path.join(source, "docs"))
+import devices
+
 faults = []
 
 
@@ -112,5 +116,6 @@ check_resting(model)
 check_constants(re.sub(r"\s+", " ", model.replace("\\|", "|")))
 check_files(model)
 check_headers(read("docs/promises.md"))
+faults += devices.faults(source)
 print("\n".join(faults) or "the pages agree with the sources")
 sys.exit(1 if faults else 0)

@@ -57,9 +57,10 @@ sh packaging/release.sh "v$version" "$work/one" >"$work/log" 2>&1 || { cat "$wor
 diff "$work/one/SHA256SUMS" build/dist/SHA256SUMS || fail "the second release differs"
 cd "$work/one"
 sha256sum --quiet -c SHA256SUMS
-[ "$(wc -l <SHA256SUMS)" = 10 ] || fail "files: $(ls)"
+[ "$(wc -l <SHA256SUMS)" = 11 ] || fail "files: $(ls)"
 tar -tzf "supine-$version.tar.gz" | grep -q /base/text.c || fail "no source"
 grep -q '^FileName: ./base/text.c' "supine-$version.spdx" && grep -q '^## ' RELEASE.md || fail "SBOM or notes"
+grep -q '^## Known anomalies' DEVICES.md || fail "no known anomalies"
 grep -q "\[$version\]" RELEASE.md && ! grep -q '^## \[0.1.0\]' RELEASE.md || fail "notes of other versions"
 
 # The program, moved to another folder, loads only libraries of the archive and of glibc.
