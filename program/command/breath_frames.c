@@ -12,6 +12,7 @@
 
 #include "program/command/breath_frames.h"
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 
 static const char name[] = "breathe";
 
@@ -35,7 +36,8 @@ typedef struct playing {
   float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
-  char vtp_comment[512];
+  char vtp_comment[512 + SUPINE_CAVEATS_SIZE];
+  char caveats[SUPINE_CAVEATS_SIZE]; /* what the basis assumes */
   supine_progress progress;
   supine_arena arena;
 } playing;
@@ -180,6 +182,7 @@ static supine_status write_tensors(playing *p, supine_error *error) {
                                       {"version", "1"},
                                       {"units", "mm, s, mL (gas and tissue of each lung)"},
                                       {"axes", "LPS"},
+                                      {"caveats", p->caveats},
                                       {"made_by", p->wanted->made_by}};
   for (size_t i = 0; i < t; ++i) {
     SUPINE_TRY(play(p, i, error));
@@ -202,9 +205,10 @@ supine_status supine_command_breath_write(const supine_command_breath_frames *wa
   SUPINE_TRY(supine_posed_positions(basis, &from.pose, p.origin, error));
   supine_options_signals_catch(true);
   p.progress = supine_options_progress_begin(name);
+  (void)supine_basis_caveats(basis, p.caveats, sizeof p.caveats);
   (void)snprintf(p.vtp_comment, sizeof p.vtp_comment,
-                 "displacement from %s; volumes are gas and tissue of each lung; %s", from.name,
-                 wanted->made_by);
+                 "displacement from %s; volumes are gas and tissue of each lung; %s; %s", from.name,
+                 p.caveats, wanted->made_by);
   if (tensors) {
     SUPINE_TRY(write_tensors(&p, error));
   } else {

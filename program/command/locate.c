@@ -11,6 +11,7 @@
 #include "precompute/posed/located.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
+#include "program/options/facts.h"
 #include "program/options/inside.h"
 #include "program/options/markups.h"
 #include "program/options/state_options.h"
@@ -216,7 +217,9 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
   }
   supine_output output = {0};
   SUPINE_TRY(supine_output_open(wanted->output, &output, error));
-  (void)fputs("# " MEANING "\nname,lung,x,y,z,expected_error_mm\n", output.file);
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(inside, caveats, sizeof caveats);
+  (void)fprintf(output.file, "# %s; %s\nname,lung,x,y,z,expected_error_mm\n", MEANING, caveats);
   for (size_t i = 0; i < info->vertex_count; ++i) {
     const size_t at = names->order[i];
     const float *p = located->xyz + 3 * at;
@@ -244,7 +247,11 @@ static supine_status finish_surface(const request *wanted, const supine_basis *l
   const double volume = 1e-3 * supine_mesh_volume(&mesh);
   const supine_mesh_field fields[] = {{"gravity_LPS", 3, located->best->state.gravity},
                                       {"volume_mL", 1, &volume}};
-  const supine_mesh_save_options save = {.comment = "in the frame of the observations",
+  char comment[64 + SUPINE_CAVEATS_SIZE];
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(lungs, caveats, sizeof caveats);
+  (void)snprintf(comment, sizeof comment, "in the frame of the observations; %s", caveats);
+  const supine_mesh_save_options save = {.comment = comment,
                                          .scalars = {{"expected_error_mm", located->sigma}},
                                          .lung = lung == NULL ? NULL : lung->data,
                                          .fields = fields,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Find each assumed, simulated or collapsed fact of a basis in each view: info, the report, the caption of render, the
-header of deform, Python. The page and JavaScript: tests/export/page_facts.mjs.
+headers of deform, breathe and locate, glTF, Python. The page and JavaScript: tests/export/page_facts.mjs.
 
     test_views.py SUPINE SOURCE LIBRARY"""
 import html
@@ -59,6 +59,11 @@ with tempfile.TemporaryDirectory() as folder:
         run("render", "b.safetensors", "--posture", "prone", "-o", "r.svg")
         run("deform", "i.safetensors", "--posture", "prone", "-o", "o.csv")
         run("deform", "b.safetensors", "--posture", "prone", "-o", "o.ply")
+        run("breathe", "b.safetensors", "--posture", "prone", "--fps", "1", "-o", "t.vtp")
+        run("breathe", "b.safetensors", "--posture", "prone", "--fps", "1", "-o", "t.safetensors")
+        run("locate", "b.safetensors", "points.csv", "--points", "i.safetensors", "--posture", "supine", "-o", "l.csv")
+        run("locate", "b.safetensors", "points.csv", "--points", "i.safetensors", "--posture", "supine", "-o", "l.ply")
+        run("export", "b.safetensors", "-o", "m.glb")
         code = ("import supine, json; b = supine.open('b.safetensors'); "
                 "print(json.dumps([[f._asdict() for f in b.facts], b.caveats]))")
         package = os.path.join(folder, "python", "supine")
@@ -73,7 +78,10 @@ with tempfile.TemporaryDirectory() as folder:
         assert [fact["name"] + fact["line"] for fact in listed] == [fact["name"] + fact["line"] for fact in facts]
         views = {"info": " ".join(run("info", "b.safetensors").split()), "report": text_of(read("r.html")),
                  "points": read("o.csv").split("\nname,")[0],
-                 "surface": read("o.ply").split("end_header")[0], "python": line}
+                 "surface": read("o.ply").split("end_header")[0], "python": line,
+                 "breath": read("t.vtp").split("<VTKFile")[0], "frames": read("t.safetensors")[:4096],
+                 "located points": read("l.csv").split("\nname,")[0],
+                 "located surface": read("l.ply").split("end_header")[0], "glTF": read("m.glb")}
         glyphs = re.findall('href="#glyph([^"]*)"', read("r.svg"))
         for fact, (view, shown) in itertools.product(caveats, views.items()):
             assert fact["name"] in shown, (kind, fact["name"], view)

@@ -6,6 +6,7 @@
 #include <supine/sh.h>
 
 #include "base/number.h"
+#include "program/options/facts.h"
 #include "program/view/export/glb.h"
 
 /* With more morph targets, the extras omit the volume formula: it has too many constants then. */
@@ -108,10 +109,12 @@ json_t *supine_export_glb_extras(const glb *g) {
   if (shares) {
     rest_text = resting_text;
   }
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(g->basis, caveats, sizeof caveats);
   json_t *extras = json_pack(
-      "{s:{s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o, s:s*, s:o*, s:s*, s:s*, s:o*, s:o*}}",
-      "supine", "frame", frame_text, "weights", weights_text, "band", (int)info->band, "modes",
-      describe_modes(info, unit), "modeUnit", unit, "bend",
+      "{s:{s:s, s:s, s:s, s:i, s:o, s:f, s:o, s:o, s:f, s:o, s:s*, s:o*, s:s*, s:s*, s:o*, s:o*}}",
+      "supine", "caveats", caveats, "frame", frame_text, "weights", weights_text, "band",
+      (int)info->band, "modes", describe_modes(info, unit), "modeUnit", unit, "bend",
       supine_options_json_numbers(3, info->bend), "middle",
       supine_options_json_numbers(3, g->targets.middle), "millimetresPerUnit", g->step, "basis",
       supine_options_json_metadata(g->basis), "gains", gains_text(g), "breathVolume",
