@@ -110,6 +110,11 @@ static const char *mark_of(const supine_comparison *c, size_t posture, const cha
   if (strcmp(of, "ratio") == 0 && !c->posture[posture].has_breath) {
     return NULL;
   }
+  for (size_t lung = 0; lung < supine_basis_get_info(c->basis)->lung_count; ++lung) {
+    if (supine_report_held(c, posture, lung).source == SUPINE_SOURCE_COLLAPSED) {
+      return NULL; /* they are of lungs that are not collapsed */
+    }
+  }
   for (size_t j = 0; j < sizeof published / sizeof *published; ++j) {
     if (strcmp(published[j].of, of) == 0 &&
         strcmp(published[j].posture, c->posture[posture].item->name) == 0) {
