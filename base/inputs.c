@@ -115,21 +115,16 @@ static const supine_input inputs[] = {
     .against = TEXT("the scan's volume at full inflation"), .measured = TEXT("share of full inflation"),
     .told = NAN, .refused = 0.9, .evidence = TEXT("assumed: breaths need more than a tenth"),
     .interfaces = OFFLINE},
-  [SUPINE_INPUT_GAS] = {
-    .name = TEXT("gas"), .group = TEXT("Patient"), .input = TEXT("volumes of the lungs"),
-    .against = TEXT("the volume of tissue"), .measured = TEXT("gas, mL"), .below = true,
-    .told = 0, .refused = NAN, .evidence = TEXT("definition; the tissue of an adult is 860 mL"),
-    .interfaces = OFFLINE},
   [SUPINE_INPUT_LUNG_SHARE] = {
     .name = TEXT("lung-share"), .group = TEXT("Patient"), .input = TEXT("the share of its volume that a collapsed lung holds"),
     .against = TEXT("the tissue alone"), .measured = TEXT("share of the lung's volume"), .below = true,
     .told = NAN, .refused = 0.1, .evidence = TEXT("assumed: tissue alone fills about 0.1 of full inflation"),
     .interfaces = OFFLINE},
   [SUPINE_INPUT_LUNGS_SMALL] = {
-    .name = TEXT("lungs-small"), .group = TEXT("Patient"), .input = TEXT("lungs at full inflation"),
-    .against = TEXT("an adult's lungs"), .measured = TEXT("volume of both lungs, mL"), .below = true,
-    .told = 3500, .refused = NAN,
-    .evidence = TEXT("equations: women of 145 cm, 1.64 SD below the mean, supine, with the tissue"),
+    .name = TEXT("lungs-small"), .group = TEXT("Patient"), .input = TEXT("lungs at full inflation, and the patient's height"),
+    .against = TEXT("adults of this height, of either sex if it is unknown"), .measured = TEXT("volume / least mean volume"), .below = true,
+    .told = 0.75, .refused = NAN,
+    .evidence = TEXT("equations: 2.0 to 3.4 SD below the mean, supine, with the tissue; without a height nothing is told, because a child's lungs hold what an adult's hold at rest"),
     .interfaces = OFFLINE},
   [SUPINE_INPUT_LABEL_VALUE] = {
     .name = TEXT("label-value"), .group = TEXT("Label maps"), .input = TEXT("a voxel of a label map, unless all are probabilities from 0 to 1"),

@@ -231,6 +231,9 @@ static void add_texts(entries *list, const supine_prepared *prepared) {
     free(law);
   }
   add(list, "sources", "%s", prepared->sources);
+  if (prepared->expected[0] != '\0') {
+    add(list, "full_expected", "%s mL", prepared->expected);
+  }
   const size_t count = told != NULL ? findings->count : 0;
   for (size_t i = 0; i < count; ++i) {
     supine_text_add(told, room, "%s%s: %s", i > 0 ? "\n" : "",

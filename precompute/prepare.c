@@ -515,6 +515,8 @@ static supine_status find_reference(supine_prepared *p, const knowledge *known,
   SUPINE_TRY(
       supine_physics_reference_find(lungs, &p->model, &known->scan, resting, &p->reference, error));
   if (p->reference.known) {
+    supine_physics_reference_compare(&p->reference, &known->person, p->expected,
+                                     sizeof p->expected);
     supine_physics_reference_doubt(&p->reference, &known->person, &known->resting,
                                    &p->source.findings);
   }

@@ -27,6 +27,7 @@ typedef struct supine_prepared {
   supine_scan posture; /**< with another simulator's fields: the posture of the scan, if known */
   supine_named_volumes named; /**< with another simulator's fields */
   char fit[256];       /**< for the user: from which data the patient was fitted, and errors */
+  char expected[64];   /**< volume at full inflation that people of this size have, or "" */
   char sources[96];    /**< metadata "sources": where facts come from (supine_basis_facts) */
   supine_arena memory; /**< of the arrays of the model */
 } supine_prepared;

@@ -254,9 +254,8 @@ CASES = {
     "height-least": (made("lungs.ply", height=160, sex="female"), made("lungs.ply", height=135, sex="female"), "told"),
     "height-most": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=200, sex="male"), "told"),
     "rest-share": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=230, sex="male"), "refused"),
-    "gas": (made("lungs.ply"), made("tiny.ply", units="mm"), "told"),
     "lung-share": (made("lungs.ply", lung="left:0.3"), made("lungs.ply", lung="left:0.001"), "refused"),
-    "lungs-small": (made("lungs.ply"), made("small.ply", units="mm"), "told"),
+    "lungs-small": (made("small.ply", units="mm"), made("small.ply", units="mm", height=170), "told"),
     "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
     "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),
     "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)),
@@ -438,8 +437,7 @@ lungs, inside = prepare()
 nodes, frame, depth, sides, ct = grid_of()
 left = 1  # the label of the left lung, which is lung 0
 solid, corners = lungs.vertices.astype(float), lungs.triangles
-write_ply("small.ply", 0.75 * solid, corners)
-write_ply("tiny.ply", 0.4 * solid, corners)
+write_ply("small.ply", 0.87 * solid, corners)
 write_ply("high.ply", (solid - solid.mean(axis=0)) * [1, 1, 1.08] + solid.mean(axis=0), corners)
 write_ply("full.ply", (solid - solid.mean(axis=0)) * 1.04 + solid.mean(axis=0), corners)
 first_lung = np.asarray(lungs.tensor("lung")).ravel()

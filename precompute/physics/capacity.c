@@ -7,7 +7,10 @@
  * volume in supine posture, and adds the tissue. The coefficients were checked against an R
  * implementation of the ECSC table (getQuanjerPred, getQuanjerLLN), not against the paper. For
  * usual heights (below), capacities are within 5 % of the medians of Hall et al. at age 40 (Eur
- * Respir J 57: 2000289, 2021). */
+ * Respir J 57: 2000289, 2021).
+ *
+ * Of the volume alone nothing can be said: a child's lungs at full inflation hold what an adult's
+ * do at rest. Small lungs are told only for a known height. */
 #include <math.h>
 
 #include <supine/inputs.h>
@@ -17,12 +20,9 @@
 #include "base/text.h"
 #include "precompute/physics/reference.h"
 
-/* The state given for a scan is doubtful if it implies a volume of both lungs at full inflation
- * below `least_share` of the expected volume, below that of the check lungs-small, or above
- * `most_ml`. */
-static const double least_share = 0.75;
+/* The state given for a scan is doubtful if it implies a larger volume of both lungs at full
+ * inflation. */
 static const double most_ml = 10000.0;
-static const double least_gas = 1000.0; /* or below this gas at rest, supine, mL */
 
 /* Largest accepted relative difference between the scan's volume and that given by --resting. */
 static const double agreement = 0.05;
@@ -137,8 +137,6 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
   double range[2];
   double full = 0.0;
   double held = 0.0;
-  static const double supine[3] = {0.0, 1.0, 0.0};
-  double rest[2];
   char expected[64] = "";
   supine_physics_reference_capacity(person, range);
   supine_physics_reference_compare(reference, person, expected, sizeof expected);
@@ -149,21 +147,10 @@ void supine_physics_reference_doubt(const supine_reference *reference, const sup
   if (at_rest) {
     doubt_rest(state, held, given, findings);
   }
-  const double gas =
-      supine_physics_reference_rest(reference, supine, rest) - part * SUPINE_TISSUE_ML;
-  const bool is_small =
-      supine_input_judge(SUPINE_INPUT_LUNGS_SMALL, full / part) != SUPINE_INPUT_TAKEN;
-  if (is_small || full < part * least_share * range[0] || gas < part * least_gas) {
-    char held_gas[32] = "no gas"; /* the tissue is an adult's: a child's lungs have less */
-    if (supine_input_judge(SUPINE_INPUT_GAS, gas) == SUPINE_INPUT_TAKEN) {
-      (void)supine_print_text(held_gas, sizeof held_gas, "%.0f mL of gas", gas);
-    }
+  const double share = person->height > 0.0 ? full / (part * range[0]) : 1.0;
+  if (supine_input_judge(SUPINE_INPUT_LUNGS_SMALL, share) != SUPINE_INPUT_TAKEN) {
     supine_findings_warn(
-        findings,
-        "at full inflation the lungs hold %.0f mL (%s mL), at rest %s, where "
-        "%.0f mL (SD 600 mL) remain after a full expiration%s: %s",
-        full, expected, held_gas, part * SUPINE_RESIDUAL_ML,
-        is_small ? "; they are too small for an adult, and all constants are an adult's" : "",
+        findings, "at full inflation the lungs hold %.0f mL (%s mL): %s", full, expected,
         at_rest ? "check the voxel spacing" : "the scan was probably not at full inflation");
     const supine_remedy of_rest[SUPINE_REMEDIES_MAX] = {
         supine_remedy_change("resting", ""),

@@ -37,6 +37,7 @@ static supine_status band_energy(const supine_basis *basis, double *energy, supi
 static const char *const facts[] = {"content",
                                     "patient",
                                     "scanned",
+                                    "full_expected",
                                     "resting_shares",
                                     "law",
                                     "force",
@@ -229,8 +230,9 @@ static const supine_option table[] = {
     {.name = NULL}};
 
 /* What the text begins with: what the basis is, how sure, and what is assumed. */
-static const char *const first[] = {"file",  "lungs",          "made_by",  "expected_error",
-                                    "facts", "resting_shares", "warnings", "embedded"};
+static const char *const first[] = {"file",           "lungs",    "made_by",
+                                    "expected_error", "facts",    "full_expected",
+                                    "resting_shares", "warnings", "embedded"};
 
 /* Put what matters into the order of the text, and add the rest if it is wanted. Free `described`.
  */

@@ -42,6 +42,10 @@ void supine_options_facts_print(const supine_basis *basis) {
     (void)supine_fact_print(&facts[i], text, sizeof text);
     supine_options_line("  %s: %s\n", facts[i].name, text);
   }
+  const char *expected = supine_basis_metadata(basis, "full_expected");
+  if (expected != NULL) {
+    supine_options_line("  full inflation by size: %s\n", expected);
+  }
 }
 
 json_t *supine_options_volume_json(const supine_fact *volume, bool as_text) {

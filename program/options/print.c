@@ -148,6 +148,7 @@ static const struct {
               {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},
               {NULL, "fitted_without_and_with_mm", "fitted: uniform, by region, mm"},
               {NULL, "from_scale", "scale at the start of motion"},
+              {NULL, "full_expected", "full inflation by size"},
               {NULL, "gain_from", "source of the gain"},
               {NULL, "gravity", "gravity (to left, back, head)"},
               {NULL, "has_volume", "encloses a volume"},

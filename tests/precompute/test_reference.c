@@ -355,25 +355,28 @@ TEST(test_predict_rest_height_and_sex_literal) {
   assert_true(fabs(resting.ml[2] - 2797.6) < 1.0);
 }
 
-/* The given state of a scan is reported as doubtful if full inflation is not of an adult's size, or
+/* The given state of a scan is reported as doubtful if full inflation is not that of people of the
+ * given height, is more than anyone's, or
  * if the given volume at rest disagrees with the scan. */
 TEST(test_doubt_implausible_volume_has_remedy) {
   static const struct {
     const char *scanned;
+    double height;      /* cm; 0 if not given */
     double full;        /* volume of each lung at full inflation, mL */
     double rest;        /* volume at rest supine given by --resting, mL; 0 if not given */
     const char *doubts; /* part of the expected warning; NULL if none is expected */
     const char *advice; /* value of the first remedy, or "" */
-  } known[] = {{"full", 3000.0, 0.0, NULL, ""},
-               {"full", 1700.0, 0.0, "not at full inflation", "supine:rest"},
-               {"full", 1900.0, 0.0, "962 mL of gas, where 1400 mL", "supine:rest"},
-               {"supine:rest", 5100.0, 0.0, "hold 10200 mL", "supine:rest+1000"},
-               {"supine:rest", 3000.0, 2400.0, "say 2400 mL", ""},
-               {"supine:rest", 3000.0, 2600.0, NULL, ""},
-               {"supine:rest+300", 3000.0, 2300.0, NULL, ""},
-               {"prone:rest", 3000.0, 2000.0, NULL, ""}};
+  } known[] = {{"full", 0.0, 3000.0, 0.0, NULL, ""},
+               {"full", 0.0, 600.0, 0.0, NULL, ""}, /* a child's */
+               {"full", 160.0, 1900.0, 0.0, "3800 mL (an adult's 5161 to", "supine:rest"},
+               {"full", 160.0, 1950.0, 0.0, NULL, ""},
+               {"supine:rest", 0.0, 5100.0, 0.0, "hold 10200 mL", "supine:rest+1000"},
+               {"supine:rest", 0.0, 3000.0, 2400.0, "say 2400 mL", ""},
+               {"supine:rest", 0.0, 3000.0, 2600.0, NULL, ""},
+               {"supine:rest+300", 0.0, 3000.0, 2300.0, NULL, ""},
+               {"prone:rest", 0.0, 3000.0, 2000.0, NULL, ""}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
-    const supine_person person = {0};
+    const supine_person person = {.height = known[i].height};
     const double full = known[i].full;
     supine_resting resting = supine_physics_resting_default();
     supine_reference reference = {.scan = scan_named(known[i].scanned),

@@ -245,9 +245,9 @@ TEST(test_precompute_scan_state_and_frame_reproduced) {
   EXPECT(1, "do not hold 6100 mL", "precompute lungs.ply --resting supine=6100mL -o b.safetensors");
   EXPECT(1, "less than the tissue", "precompute low.ply --scanned full-90000 -o b.safetensors");
   EXPECT(0,
-         "warning: at full inflation the lungs hold 3000 mL (an adult's 4566 to 8525 mL), at rest "
-         "582 mL of gas",
-         "precompute lungs.ply --units 0.7937005 --band 2 -o a.safetensors");
+         "warning: at full inflation the lungs hold 3000 mL (an adult's 5756 to 6724 mL): the scan "
+         "was probably not at full inflation",
+         "precompute lungs.ply --units 0.7937005 --height 170 --band 2 -o a.safetensors");
   EXPECT(0, "volume at rest, supine: 3000 mL, given\n",
          "precompute lungs.ply --resting supine=3000mL --height 178 --sex male --band 3 "
          "-o a.safetensors");
