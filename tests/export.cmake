@@ -15,7 +15,7 @@ if(NODE_PROGRAM)
 else()
   set(SUPINE_NODE sh -c "echo 'skipped: node is not installed'; exit 77")
 endif()
-foreach(what colour glb pages) # pages.mjs holds all tests that need a browser
+foreach(what colour glb numbers pages) # pages.mjs holds all tests that need a browser
   add_test(NAME export_${what}_node COMMAND ${SUPINE_NODE} ${CMAKE_CURRENT_SOURCE_DIR}/export/${what}.mjs)
   set_tests_properties(export_${what}_node PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
