@@ -40,6 +40,42 @@ for (const name of ['displacement', 'difference']) {
   assert.ok(ratio < 1.1, `${name}: steps differ by a factor of ${ratio}`);
 }
 
+// Colours of anatomy stay apart with each kind of colour vision. Rows are linear red, green and blue as seen by someone
+// without red, green or blue cones (Machado, Oliveira and Fernandes 2009, severity 1).
+const VISION = {
+  protanopia: [
+    [0.152286, 1.052583, -0.204868],
+    [0.114503, 0.786281, 0.099216],
+    [-0.003882, -0.048116, 1.051998],
+  ],
+  deuteranopia: [
+    [0.367322, 0.860646, -0.227968],
+    [0.280085, 0.672501, 0.047413],
+    [-0.01182, 0.04294, 0.968881],
+  ],
+  tritanopia: [
+    [1.255528, -0.076749, -0.178779],
+    [-0.078411, 0.930809, 0.147602],
+    [0.004733, 0.691367, 0.3039],
+  ],
+};
+const APART = 0.045; // OKLab
+const linear = (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4);
+const coded = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+for (const [name, rows] of Object.entries(VISION)) {
+  const seen = anatomyColours.map((hex) => {
+    const rgb = Array.from(Buffer.from(hex.slice(1), 'hex'), linear);
+    const cones = rows.map((row) => row.reduce((sum, part, k) => sum + part * rgb[k], 0));
+    return oklab(cones.map((x) => coded(Math.min(1, Math.max(0, x)))));
+  });
+  seen.forEach((a, i) =>
+    seen.slice(0, i).forEach((b, j) => {
+      const far = Math.hypot(...a.map((x, k) => x - b[k]));
+      assert.ok(far > APART, `${name}: anatomy ${i} and ${j} are ${far.toFixed(3)} apart`);
+    }),
+  );
+}
+
 // The colour bar of the report shows the colour map of displacements.
 supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
