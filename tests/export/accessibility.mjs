@@ -35,6 +35,40 @@ function contrast(a, b) {
   return (high + 0.05) / (low + 0.05);
 }
 
+/* Before the first picture, without WebAssembly, without WebGL, and after a link with wrong values, on a phone and on a
+ * wall; nothing is wider than the window, and the console is empty. */
+for (const [what, width, init, hash] of [
+  ['before the first picture', 320, () => { WebAssembly.compile = () => new Promise(() => {}); }, ''],
+  ['without WebAssembly', 390, () => { delete window.WebAssembly; }, ''],
+  [
+    'without WebGL',
+    2560,
+    () => {
+      const { getContext } = HTMLCanvasElement.prototype;
+      HTMLCanvasElement.prototype.getContext = function context(kind, ...rest) {
+        return kind === 'webgl2' ? null : getContext.call(this, kind, ...rest);
+      };
+    },
+    '',
+  ],
+  ['after a wrong link', 320, () => {}, '#posture=pron&depth=9000&prone'],
+]) {
+  const { page, complaints } = await open(html, { viewport: { width, height: 700 }, init }, hash);
+  const isRead = !what.startsWith('before') && !what.endsWith('WebAssembly');
+  if (isRead) await page.waitForFunction(() => document.getElementById('finding').textContent);
+  await check(page, what);
+  const [said, wide] = await page.evaluate(() => [
+    document.body.innerText,
+    document.documentElement.scrollWidth - window.innerWidth,
+  ]);
+  const [word] = what.split(' ');
+  const words = { before: /Reading the lungs/, without: /moves|WebAssembly/, after: /Link: posture .* instead: left/ };
+  assert.match(said, words[word], what);
+  assert.ok(wide <= 0, `${what}: ${wide} px too wide`);
+  assert.deepEqual(complaints, [], what);
+  await close(page);
+}
+
 for (const colorScheme of ['light', 'dark']) {
   const { page, complaints } = await openLungs(
     html,
@@ -77,6 +111,18 @@ for (const colorScheme of ['light', 'dark']) {
     const ratio = contrast(long(colours[a]), long(colours[b]));
     assert.ok(ratio >= 3, `${colorScheme}: ${a} on ${b} is ${ratio.toFixed(2)}`);
   }
+  /* Printed, the picture is large, and controls are left out. */
+  await page.emulateMedia({ media: 'print' });
+  const printed = await page.evaluate(() => {
+    window.dispatchEvent(new Event('beforeprint'));
+    const stage = document.getElementById('stage');
+    const shown = [...document.querySelectorAll('input, select, #play, #more')].filter((e) => e.checkVisibility());
+    return [stage.clientHeight, stage.style.backgroundImage.slice(0, 14), shown.map((e) => e.id || e.name)];
+  });
+  assert.ok(printed[0] > 400, `a picture of ${printed[0]} px`);
+  assert.deepEqual(printed.slice(1), ['url("data:imag', []]);
+  await page.evaluate(() => window.dispatchEvent(new Event('afterprint')));
+  await page.emulateMedia({ media: null });
   assert.deepEqual(complaints, []);
   await close(page);
 

@@ -171,7 +171,15 @@ for (const path of [html, small]) {
       shown.map(([name]) => name),
       names,
     );
-    shown.forEach(([name, mm, , error], i) => {
+    shown.forEach(([name, mm, , error, place], i) => {
+      const [, another, day] = /^within ([\d.]+)\u00a0mm, (.*)$/.exec(place);
+      assert.equal(day, 'another day');
+      near(
+        another,
+        truth[posture][i].another_day_error_mm,
+        WRITTEN_MM,
+        `${name}, ${posture}: error on another day of page and deform`,
+      );
       near(parseFloat(mm), truth[posture][i].moved_mm, WRITTEN_MM, `${name}, ${posture}: page and deform`);
       near(
         parseFloat(error),

@@ -183,18 +183,22 @@ function tell(text) {
   $('message').textContent = text;
 }
 
+/** Say why there is no picture, above the still picture if the page has one. */
+function tellWhy(text) {
+  tell(text);
+  if (!$('still')) return;
+  $('still').firstElementChild.textContent = text;
+  document.body.classList.add('still');
+}
+
 document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
 document.body.classList.remove('still');
-try {
-  if (!MeshoptDecoder.supported)
-    throw new Error('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
-  await MeshoptDecoder.ready;
-  window.supine = await start();
-} catch (error) {
-  tell(error.message);
-  if ($('still')) {
-    $('still').firstElementChild.textContent = error.message;
-    document.body.classList.add('still');
+if (MeshoptDecoder.supported) {
+  try {
+    await MeshoptDecoder.ready;
+    window.supine = await start();
+  } catch (error) {
+    tellWhy(error.message);
+    throw error;
   }
-  throw error;
-}
+} else tellWhy('This browser has no WebAssembly, which reads the lungs. Open the page in another browser.');
