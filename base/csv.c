@@ -10,6 +10,7 @@
 #include "base/ascii.h"
 #include "base/csv.h"
 #include "base/number.h"
+#include "base/quantity.h"
 #include "base/text.h"
 
 static char *trim(char *text) {
@@ -211,12 +212,13 @@ static supine_status read_header(supine_csv *csv, const char *name, char **text,
   return SUPINE_OK;
 }
 
-/* Units that a column may name, in mm, mL, s or cmH2O. */
-static const struct {
-  const char *name;
-  double factor;
-} units[] = {{"mm", 1.0}, {"cm", 10.0},  {"m", 1000.0}, {"um", 1e-3}, {"in", 25.4}, {"mL", 1.0},
-             {"ml", 1.0}, {"L", 1000.0}, {"l", 1000.0}, {"s", 1.0},   {"ms", 1e-3}, {"cmH2O", 1.0}};
+/* Find a unit that a column may name, in mm, mL, s or cmH2O. Return false for other names. */
+static bool find_unit(const char *name, double *factor) {
+  return supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, name, factor) ||
+         supine_quantity_find_unit(SUPINE_QUANTITY_VOLUME, name, factor) ||
+         supine_quantity_find_unit(SUPINE_QUANTITY_TIME, name, factor) ||
+         supine_quantity_find_unit(SUPINE_QUANTITY_PRESSURE, name, factor);
+}
 
 /* Return the length of a column's name without the unit in brackets behind it, such as "x (mm)".
  * Set `unit` to the unit without brackets, "" if there is none. */
@@ -248,14 +250,10 @@ static supine_status find_column(const supine_csv *csv, const char *field, const
   *column = c;
   *scale = 1.0;
   if (c < count && unit[0] != '\0' && !supine_ascii_same(field, names[c])) {
-    size_t u = 0;
-    while (u < sizeof units / sizeof *units && strcmp(unit, units[u].name) != 0) {
-      ++u;
-    }
-    SUPINE_REFUSE_IF(u == sizeof units / sizeof *units, error, SUPINE_ERROR_FORMAT,
+    const bool known = find_unit(unit, scale);
+    SUPINE_REFUSE_IF(!known, error, SUPINE_ERROR_FORMAT,
                      "%s:%zu: the unit of column \"%s\" is unknown: give mm, mL, s or cmH2O",
                      csv->path, csv->line, field);
-    *scale = units[u].factor;
   }
   return SUPINE_OK;
 }

@@ -10,21 +10,18 @@
 /* A pressure of 1 kPa in cmH2O, at 4 degrees Celsius [ISO 80000-4]. */
 #define CMH2O_PER_KPA 10.19716
 
-typedef struct unit {
-  const char *name;
-  double factor; /* the unit, in the first unit of the quantity */
-} unit;
-
-enum { UNITS_MAX = 4 };
+enum { UNITS_MAX = 6 };
 
 static const struct {
-  unit unit[UNITS_MAX];
-  const char *words;   /* the units, for messages */
-  const char *example; /* for quantities whose texts must name the unit; otherwise NULL */
+  supine_unit unit[UNITS_MAX]; /* ended by a name that is NULL */
+  const char *words;           /* the units, for messages */
+  const char *example;         /* for quantities whose texts must name the unit; otherwise NULL */
 } quantities[] = {
     [SUPINE_QUANTITY_NUMBER] = {.words = ""},
     [SUPINE_QUANTITY_VOLUME] = {{{"mL", 1}, {"L", 1000}}, "mL or L", "500mL or 0.5L"},
-    [SUPINE_QUANTITY_LENGTH] = {{{"mm", 1}, {"cm", 10}, {"m", 1000}}, "mm, cm or m", NULL},
+    [SUPINE_QUANTITY_LENGTH] = {{{"mm", 1}, {"cm", 10}, {"m", 1000}, {"um", 1e-3}, {"in", 25.4}},
+                                "mm, cm or m",
+                                NULL},
     [SUPINE_QUANTITY_HEIGHT] = {{{"cm", 1}, {"m", 100}, {"mm", 0.1}}, "cm, m or mm", NULL},
     [SUPINE_QUANTITY_TIME] = {{{"s", 1}, {"ms", 1e-3}, {"min", 60}}, "s, ms or min", NULL},
     [SUPINE_QUANTITY_ANGLE] = {{{"deg", 1}, {"\xC2\xB0", 1}}, "deg", NULL},
@@ -42,6 +39,20 @@ const char *supine_quantity_units(supine_quantity quantity) {
   return quantities[quantity].words;
 }
 
+const supine_unit *supine_quantity_list(supine_quantity quantity) {
+  return quantities[quantity].unit;
+}
+
+bool supine_quantity_find_unit(supine_quantity quantity, const char *name, double *factor) {
+  for (const supine_unit *unit = supine_quantity_list(quantity); unit->name != NULL; ++unit) {
+    if (supine_ascii_same(name, unit->name)) {
+      *factor = unit->factor;
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Return whether a unit that `text` begins with ends there: no letter or digit follows. */
 static bool ends(const char *text) {
   static const char letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/";
@@ -57,12 +68,11 @@ const char *supine_quantity_read(const char *text, supine_quantity quantity, dou
     return NULL;
   }
   *value = number;
-  for (size_t i = 0; i < UNITS_MAX && quantities[quantity].unit[i].name != NULL; ++i) {
-    const unit *u = &quantities[quantity].unit[i];
-    const size_t length = strlen(u->name);
-    if (supine_ascii_same_begin(end, u->name, length) && ends(end + length)) {
+  for (const supine_unit *unit = supine_quantity_list(quantity); unit->name != NULL; ++unit) {
+    const size_t length = strlen(unit->name);
+    if (supine_ascii_same_begin(end, unit->name, length) && ends(end + length)) {
       *has_unit = true;
-      *value = number * u->factor;
+      *value = number * unit->factor;
       return isfinite(*value) ? end + length : NULL;
     }
   }

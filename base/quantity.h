@@ -22,6 +22,19 @@ typedef enum supine_quantity {
   SUPINE_QUANTITY_COUNT
 } supine_quantity;
 
+/** A unit, in the first unit of its quantity. */
+typedef struct supine_unit {
+  const char *name;
+  double factor;
+} supine_unit;
+
+/** Return the units of a quantity, its own first, ended by a name that is NULL. */
+const supine_unit *supine_quantity_list(supine_quantity quantity);
+
+/** Find a unit of a quantity by its name, in any letter case. Return false for any other name.
+ * @param factor  the unit, in the first unit of the quantity */
+bool supine_quantity_find_unit(supine_quantity quantity, const char *name, double *factor);
+
 /** Return the units of a quantity in words, its own first, such as "mm, cm or m"; "" for numbers.
  */
 const char *supine_quantity_units(supine_quantity quantity);

@@ -81,8 +81,6 @@ enum { SUPINE_MESH_ANIMAL_LEAST = 5 };
  * @param other  output, a string literal: the unit other than mm in which a length of `side` is
  *             most likely; NULL if it is impossible in every other unit */
 bool supine_mesh_unit_is_likely(double side, const char **other);
-/** Find the length in mm of "mm", "cm", "m", "um" or "in"; return false for any other name. */
-bool supine_mesh_unit_find(const char *name, double *millimetres);
 /** Name a unit of length: "mm", "cm", "m", "um", "in" or, for others, a text such as "2.5 mm".
  * @param text  [24] output */
 void supine_mesh_unit_name(double millimetres, char *text);

@@ -10,6 +10,7 @@
 #include "base/arena.h"
 #include "base/ascii.h"
 #include "base/number.h"
+#include "base/quantity.h"
 #include "base/vec3.h"
 
 #include "mesh/image/image_formats.h"
@@ -179,7 +180,8 @@ static const char *describe(const header *h, supine_image *image, size_t *type_i
   if (unspaced != NULL) {
     return unspaced;
   }
-  if (*unit != '\0' && strcmp(unit, "?") != 0 && !supine_mesh_unit_find(unit, &millimetres)) {
+  if (*unit != '\0' && strcmp(unit, "?") != 0 &&
+      !supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, unit, &millimetres)) {
     return "its DistanceUnits are unknown; save the image in mm";
   }
   if (channels != 1.0 || (n == 4 && size[3] != 1.0)) {

@@ -10,6 +10,7 @@
 #include "base/arena.h"
 #include "base/ascii.h"
 #include "base/number.h"
+#include "base/quantity.h"
 #include "mesh/image/image_formats.h"
 
 /* The names of each type of voxels. The first is the one that is written. */
@@ -307,7 +308,7 @@ static bool read_unit(const char *units, double *millimetres) {
     at += 1 + length;
     at += *at != '\0' ? 1 : 0;
   }
-  return *first == '\0' || supine_mesh_unit_find(first, millimetres);
+  return *first == '\0' || supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, first, millimetres);
 }
 
 /* Find sizes, position and axes. Without an origin, the first voxel is at 0, as in teem. */

@@ -11,6 +11,7 @@
 #include "base/arena.h"
 #include "base/csv.h"
 #include "base/locale.h"
+#include "base/quantity.h"
 #include "base/text.h"
 
 #include "mesh/io/points.h"
@@ -221,7 +222,7 @@ static bool find_markup_unit(const json_t *markup, const char **name, double *mi
   const json_t *code = json_is_array(stated) ? json_array_get(stated, 0) : stated;
   *name = json_is_string(code) ? json_string_value(code) : "";
   *millimetres = 1.0;
-  return stated == NULL || supine_mesh_unit_find(*name, millimetres);
+  return stated == NULL || supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, *name, millimetres);
 }
 
 static supine_status read_markup(reading *r, const json_t *markup) {

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/arena.h"
+#include "base/quantity.h"
 #include "base/vec3.h"
 
 #include "precompute/inside/shells.h"
@@ -222,7 +223,7 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
     double millimetres = 1.0;
     supine_axes axes;
     char letters[4];
-    (void)supine_mesh_unit_find(units[i / 5], &millimetres);
+    (void)supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, units[i / 5], &millimetres);
     (void)supine_mesh_axes_parse(frames[i % 5], &axes);
     const size_t inside = count_inside(shells, points, count, step, axes, millimetres / unit);
     if (inside > reading->inside &&

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/ascii.h"
+#include "base/quantity.h"
 #include "program/options/command.h"
 #include "program/options/surface_options.h"
 
@@ -21,7 +22,7 @@ static supine_status read_units(const char *text, void *field, supine_error *err
   double *millimetres = field;
   (void)error;
   return supine_options_fits(
-      supine_mesh_unit_find(text, millimetres) ||
+      supine_quantity_find_unit(SUPINE_QUANTITY_LENGTH, text, millimetres) ||
       (supine_options_parse_number(text, millimetres) && *millimetres > 0.0));
 }
 
