@@ -3,8 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include <supine/compare.h>
-
 #include "base/arena.h"
 #include "precompute/lungs/disease.h"
 #include "precompute/stored.h"
@@ -144,21 +142,14 @@ static supine_status name_volumes(const supine_basis *basis, const supine_named_
  * without that of band 0. A surface without area has none. */
 static supine_status measure_turning(const supine_basis *basis, supine_accuracy *accuracy,
                                      supine_error *error) {
-  const size_t bands = supine_basis_get_info(basis)->band + 1;
-  double energy[SUPINE_SH_BAND_MAX + 1];
+  double share[SUPINE_SH_BAND_MAX + 1] = {0.0};
   double turning = 0.0;
-  supine_compare *compare = NULL;
-  const supine_status status = supine_compare_create(basis, &compare, error);
-  if (status != SUPINE_OK) {
-    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
-  }
-  supine_compare_energy(compare, energy);
-  supine_compare_destroy(compare);
-  for (size_t l = 1; l < bands; ++l) {
-    turning += energy[l];
+  SUPINE_TRY(supine_projection_band_shares(basis, share, error));
+  for (size_t l = 1; l <= supine_basis_get_info(basis)->band; ++l) {
+    turning += share[l];
   }
   if (turning > 0.0) {
-    accuracy->turning_rms = accuracy->relative_rms * sqrt(1.0 + energy[0] / turning);
+    accuracy->turning_rms = accuracy->relative_rms * sqrt(1.0 + share[0] / turning);
   }
   return SUPINE_OK;
 }

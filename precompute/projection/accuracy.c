@@ -13,6 +13,7 @@
 #include "base/vec3.h"
 #include "precompute/physics/resting.h"
 #include "precompute/projection/accuracy.h"
+#include <supine/compare.h>
 #include <supine/runtime.h>
 #include <supine/sh.h>
 #include <supine/volume.h>
@@ -309,5 +310,25 @@ supine_status supine_projection_accuracy_add_storage(const supine_basis *basis,
   accuracy->rms_mm = hypot(accuracy->rms_mm, rms);
   accuracy->p95_mm = hypot(accuracy->p95_mm, p95);
   accuracy->max_mm += errors->largest;
+  return SUPINE_OK;
+}
+
+supine_status supine_projection_band_shares(const supine_basis *basis, double *share,
+                                            supine_error *error) {
+  const size_t band = supine_basis_get_info(basis)->band;
+  supine_compare *compare = NULL;
+  const supine_status status = supine_compare_create(basis, &compare, error);
+  double total = 0.0;
+  if (status != SUPINE_OK) {
+    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
+  }
+  supine_compare_energy(compare, share);
+  supine_compare_destroy(compare);
+  for (size_t l = 0; l <= band; ++l) {
+    total += share[l];
+  }
+  for (size_t l = 0; l <= band; ++l) {
+    share[l] /= total > 0.0 ? total : 1.0;
+  }
   return SUPINE_OK;
 }

@@ -100,6 +100,11 @@ supine_status supine_projection_turned_over(const supine_lungs *lungs, const sup
                                             const double volume[9], double *share,
                                             supine_error *error);
 
+/** Compute the share of each band (degree) of the harmonics in the squared displacement of a basis.
+ * @param share  [band + 1], unchanged if the surface has no area */
+supine_status supine_projection_band_shares(const supine_basis *basis, double *share,
+                                            supine_error *error);
+
 /** Relative RMS errors for the held-out directions of gravity, over at most 4096 evenly chosen
  * vertices. */
 typedef struct supine_error_table {

@@ -5,33 +5,12 @@
 
 #include "base/arena.h"
 
-#include <supine/compare.h>
 #include <supine/runtime.h>
 
+#include "precompute/projection/accuracy.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/facts.h"
-
-/* Compute the share of each spherical-harmonic band (degree) in the squared displacement; 0 if the
- * surface has no area. */
-static supine_status band_energy(const supine_basis *basis, double *energy, supine_error *error) {
-  supine_compare *compare = NULL;
-  const supine_status status = supine_compare_create(basis, &compare, error);
-  if (status != SUPINE_OK) {
-    return status == SUPINE_ERROR_MESH ? SUPINE_OK : status;
-  }
-  supine_compare_energy(compare, energy);
-  supine_compare_destroy(compare);
-  double total = 0.0;
-  const size_t band = supine_basis_get_info(basis)->band;
-  for (size_t l = 0; l <= band; ++l) {
-    total += energy[l];
-  }
-  for (size_t l = 0; l <= band; ++l) {
-    energy[l] /= total > 0.0 ? total : 1.0;
-  }
-  return SUPINE_OK;
-}
 
 /* Keys of the basis's metadata that are printed under the same name. */
 static const char *const facts[] = {"content",
@@ -256,13 +235,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const char *path = given->operand[0];
   static const supine_basis_options options = {sizeof options, .without_normals = true};
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  SUPINE_ARENA arena = {0};
+  double energy[SUPINE_SH_BAND_MAX + 1] = {0.0};
   json_auto_t *described = NULL;
   SUPINE_TRY(supine_basis_open_with(path, &options, &basis, error));
-  const size_t bands = supine_basis_get_info(basis)->band + 1;
-  double *energy = supine_arena_zeros(&arena, bands, sizeof *energy);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu bands", bands));
-  SUPINE_TRY(band_energy(basis, energy, error));
+  SUPINE_TRY(supine_projection_band_shares(basis, energy, error));
   SUPINE_TRY(describe(path, basis, energy, &described, error));
   if (!supine_options_as_json()) {
     described = order_text(described, wanted->all);
