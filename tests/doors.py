@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import sys
 
-from helpers.verdict import (SOURCE, SUPINE, command, even, folder, javascript, pose_in_c, python, stream, supine,
+from helpers.verdict import (SOURCE, SUPINE, command, even, javascript, leave, pose_in_c, python, stream, supine,
                              table, transform, volume_number, volume_text, voxels_of, write_image, write_pairs,
                              write_ply,
                              write_points)
@@ -432,7 +432,4 @@ def main():
     return 1 if faults else 0
 
 
-status = main()
-os.chdir(SOURCE)
-folder.cleanup()
-sys.exit(status)
+leave(main())

@@ -10,9 +10,8 @@ import ctypes
 import functools
 import os
 import struct
-import sys
 
-from helpers.verdict import (SOURCE, command, even, folder, javascript, pose_in_c, python, stream, supine, table,
+from helpers.verdict import (command, even, javascript, leave, pose_in_c, python, stream, supine, table,
                              transform, write_ply)
 import numpy as np
 from supine import _library as c
@@ -472,6 +471,4 @@ for row in rows:
 for name in CASES.keys() - {row.name.decode() for row in rows}:
     faults.append(f"{name}: not in the table")
 print("\n".join(faults) if faults else f"{len(rows)} rows: the interfaces agree")
-os.chdir(SOURCE)
-folder.cleanup()
-sys.exit(1 if faults else 0)
+leave(1 if faults else 0)

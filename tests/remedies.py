@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 
-from helpers.verdict import (SOURCE, SUPINE, command, folder, supine, voxels_of, write_image, write_pairs, write_ply,
+from helpers.verdict import (SOURCE, SUPINE, command, leave, supine, voxels_of, write_image, write_pairs, write_ply,
                              write_points)
 import numpy as np
 
@@ -214,7 +214,4 @@ def main():
     return 1 if faults else 0
 
 
-status = main()
-os.chdir(SOURCE)
-folder.cleanup()
-sys.exit(status)
+leave(main())
