@@ -47,24 +47,16 @@ bool supine_text_is_utf8(const char *text) {
   return true;
 }
 
-size_t supine_text_fit(const char *text, size_t most) {
-  size_t length = strnlen(text, most + 1);
-  if (length > most) {
-    length = most;
-    while (length > 0 && ((unsigned char)text[length] & 0xC0U) == 0x80U) {
-      --length;
-    }
-  }
-  return length;
-}
-
 const char *supine_text_shorten(const char *text, size_t size, char *shortened) {
   static const char ellipsis[] = "\xE2\x80\xA6";
   size_t length = strlen(text);
   if (length < size) {
     memcpy(shortened, text, length + 1);
   } else {
-    length = supine_text_fit(text, size - sizeof ellipsis);
+    length = size - sizeof ellipsis;
+    while (length > 0 && ((unsigned char)text[length] & 0xC0U) == 0x80U) {
+      --length;
+    }
     memcpy(shortened, text, length);
     memcpy(shortened + length, ellipsis, sizeof ellipsis);
   }

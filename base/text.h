@@ -22,10 +22,6 @@ void supine_text_suggest(const char *before, const char *word, char *text, size_
 /** Return whether a text is UTF-8. */
 bool supine_text_is_utf8(const char *text);
 
-/** Return the length of the longest part of `text`, from its begin, that has at most `most` bytes
- * and does not cut a UTF-8 character. */
-size_t supine_text_fit(const char *text, size_t most);
-
 /** Copy `text` to `shortened`, which has room for `size` bytes, 4 or more. If it is too long, cut
  * it between two UTF-8 characters and end it with "...", an ellipsis of one character. Return
  * `shortened`. */
