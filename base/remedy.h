@@ -17,8 +17,10 @@ static inline supine_remedy supine_remedy_make(supine_remedy_kind kind, const ch
   while (value[length] != '\0') {
     ++length;
   }
-  for (size_t i = 0; i < length && length < sizeof remedy.value; ++i) {
-    remedy.value[i] = value[i];
+  if (length < sizeof remedy.value) {
+    for (size_t i = 0; i < length; ++i) {
+      remedy.value[i] = value[i];
+    }
   }
   return remedy;
 }

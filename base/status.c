@@ -103,8 +103,11 @@ static void write_remedy(const supine_remedy *remedy, supine_words words, char *
 
 void supine_remedies_add(const supine_remedy remedies[SUPINE_REMEDIES_MAX], supine_words words,
                          char *text, size_t size) {
-  for (size_t i = 0; i < SUPINE_REMEDIES_MAX && remedies[i].kind != SUPINE_REMEDY_NONE; ++i) {
+  for (size_t i = 0; i < SUPINE_REMEDIES_MAX; ++i) {
     char one[256];
+    if (remedies[i].kind == SUPINE_REMEDY_NONE) {
+      return;
+    }
     const size_t length = strlen(text);
     const char last = length > 0 ? text[length - 1] : ';';
     write_remedy(&remedies[i], words, one, sizeof one);

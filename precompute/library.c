@@ -220,12 +220,14 @@ static supine_status list_facts(owned *to, supine_error *error) {
   SUPINE_TRY(supine_basis_open_memory(to->bytes.data, to->bytes.size, &basis, error));
   const size_t count = supine_basis_facts(basis, facts);
   const char **list = supine_arena_zeros(&to->memory, count, sizeof *list);
-  for (size_t i = 0; i < count && list != NULL; ++i) {
-    char value[320];
-    char line[400];
-    (void)supine_fact_print(&facts[i], value, sizeof value);
-    const int length = snprintf(line, sizeof line, "%s: %s", facts[i].name, value);
-    list[i] = copy(&to->memory, line, (size_t)length);
+  if (list != NULL) {
+    for (size_t i = 0; i < count; ++i) {
+      char value[320];
+      char line[400];
+      (void)supine_fact_print(&facts[i], value, sizeof value);
+      const int length = snprintf(line, sizeof line, "%s: %s", facts[i].name, value);
+      list[i] = copy(&to->memory, line, (size_t)length);
+    }
   }
   supine_basis_close(basis);
   to->result.assumptions = list;

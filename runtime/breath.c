@@ -321,9 +321,11 @@ supine_status supine_breath_evaluate(const supine_pv *pv, const supine_pv_breath
     return SUPINE_OK;
   }
   if (breath->course == SUPINE_PV_CONSTANT_FLOW && pressures == NULL) {
-    for (size_t j = 0; j < count && volumes != NULL; ++j) {
-      supine_pv_limb limb = SUPINE_PV_INHALE;
-      volumes[j] = breath->tidal * breath_share(breath, times[j], &limb);
+    if (volumes != NULL) {
+      for (size_t j = 0; j < count; ++j) {
+        supine_pv_limb limb = SUPINE_PV_INHALE;
+        volumes[j] = breath->tidal * breath_share(breath, times[j], &limb);
+      }
     }
     return SUPINE_OK;
   }

@@ -206,20 +206,16 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   const double spread = number_of(basis, "resting_spread", EXPECTED_SPREAD) *
                         (assumed == SUPINE_VOLUME_REST ? resting_share(basis) : 1);
   const double own = supine_expected_constant(basis);
-  supine_status status = SUPINE_OK;
   *m = (supine_expected_model){.basis = basis, .least = least};
-  for (size_t k = 0; k < 2 && status == SUPINE_OK; ++k) {
-    status = k == 0 ? supine_basis_pose_any(basis, state, &m->pose[0], error)
-                    : pose_or_scan(basis, from, &m->pose[1], error);
+  SUPINE_TRY(supine_basis_pose_any(basis, state, &m->pose[0], error));
+  SUPINE_TRY(pose_or_scan(basis, from, &m->pose[1], error));
+  for (size_t k = 0; k < 2; ++k) {
     m->pose[EXPECTED_FULLER + k] = m->pose[k];
-    if (status == SUPINE_OK && (deviation > 0 ? k == 0 : counts_from(states[k], assumed))) {
-      status = supine_expected_shifted(basis, states[k], &m->pose[EXPECTED_FULLER + k], error);
+    if (deviation > 0 ? k == 0 : counts_from(states[k], assumed)) {
+      SUPINE_TRY(supine_expected_shifted(basis, states[k], &m->pose[EXPECTED_FULLER + k], error));
       m->per_step = (deviation > 0 ? deviation / supine_expected_reference(basis) : spread) /
                     supine_expected_shift;
     }
-  }
-  if (status != SUPINE_OK) {
-    return status;
   }
   find_turn(state, from, m);
   SUPINE_TRY(find_collapse(basis, m, error));
@@ -235,12 +231,14 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
   if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
     m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / EXPECTED_FULL_BREATH) - m->law);
   }
-  for (size_t k = 0; k < 2 && m->turn > 0 && status == SUPINE_OK; ++k) {
-    supine_state level = *states[k];
-    memcpy(level.gravity, basis->scan_gravity, sizeof level.gravity);
-    status = supine_basis_pose_any(basis, &level, &m->pose[EXPECTED_LEVEL + k], error);
+  if (m->turn > 0) {
+    for (size_t k = 0; k < 2; ++k) {
+      supine_state level = *states[k];
+      memcpy(level.gravity, basis->scan_gravity, sizeof level.gravity);
+      SUPINE_TRY(supine_basis_pose_any(basis, &level, &m->pose[EXPECTED_LEVEL + k], error));
+    }
   }
-  return status;
+  return SUPINE_OK;
 }
 
 /* Return the number b of the formula at a point p, mm: about 1 beside the heart, 0 far from it. */

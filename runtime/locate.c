@@ -431,8 +431,9 @@ static size_t list_views(const workspace *s, size_t j, size_t *views) {
   const supine_observation *observed = s->task->observed;
   size_t count = 1;
   views[0] = j;
-  for (size_t k = 0; k < s->task->count && count < SUPINE_KRIGING_LEFT_MAX; ++k) {
-    if (k != j && observed[k].vertex == observed[j].vertex) {
+  for (size_t k = 0; k < s->task->count; ++k) {
+    const bool other = k != j && observed[k].vertex == observed[j].vertex;
+    if (other && count < SUPINE_KRIGING_LEFT_MAX) {
       views[count++] = k;
     }
   }

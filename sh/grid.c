@@ -51,13 +51,14 @@ supine_status supine_sh_grid_create(size_t latitudes, size_t longitudes, supine_
   if (made == NULL || work == NULL || table == NULL || made->z == NULL || made->weight == NULL) {
     supine_sh_grid_destroy(made);
     made = NULL;
-  }
-  for (size_t j = 0; j < latitudes && made != NULL; ++j) { /* GSL's nodes ascend, these descend */
-    const size_t south = latitudes - 1 - j;
-    (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
-  }
-  if (made != NULL && table->precomputed == 0) {
-    refine(made, work);
+  } else {
+    for (size_t j = 0; j < latitudes; ++j) { /* GSL's nodes ascend, these descend */
+      const size_t south = latitudes - 1 - j;
+      (void)gsl_integration_glfixed_point(-1, 1, j, &made->z[south], &made->weight[south], table);
+    }
+    if (table->precomputed == 0) {
+      refine(made, work);
+    }
   }
   if (table != NULL) { /* GSL 2.7 does not accept NULL here */
     gsl_integration_glfixed_table_free(table);

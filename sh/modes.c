@@ -132,8 +132,10 @@ supine_status supine_sh_compress_modes(const supine_expansion *expansion, const 
   }
   memcpy(compression->modes, modes, count * terms * sizeof *modes);
   supine_sh_compression_mix(expansion, compression);
-  for (size_t k = 0; singular != NULL && k < mode_max; ++k) {
-    singular[k] = k < count ? sqrt(values[k]) : 0.0;
+  if (singular != NULL) {
+    for (size_t k = 0; k < mode_max; ++k) {
+      singular[k] = k < count ? sqrt(values[k]) : 0.0;
+    }
   }
   if (total != NULL) {
     *total = energy;

@@ -430,6 +430,10 @@ def hidden_if(text, begin):
     turn = f"{head[2]};{body}" if len(head) == 3 else ""
     parts = split_at(head[1], "&&") if len(head) == 3 else []
     for part in parts if len(parts) > 1 else []:
+        part = re.sub(r"\bsizeof\s*\(?[\w.>-]+", "", part)
+        pointer = re.fullmatch(r"\s*([\w.>-]+) [!=]= NULL\s*", part)
+        if pointer and not re.search(r"(?<![\w.>])%s = |&%s\b(?!->|\[|\.)" % ((re.escape(pointer[1]),) * 2), turn):
+            return part.strip()
         names = set(re.findall(r"(?<![.\w>])[A-Za-z_]\w*", part)) | set(re.findall(r"->\s*(\w+)", part))
         passed = re.findall(r"\w\(([^;{}]*)\)", turn)
         changes = any(re.search(CHANGED.format(name), turn) for name in names)
@@ -488,6 +492,8 @@ def forms_of(text):
 # Code that check_forms refuses, and the same written plainly.
 FORMS = (("for (i = 0; i < n && wanted; ++i) { f(i); }", "if (wanted) { for (i = 0; i < n; ++i) { f(i); } }"),
          ("for (a = 0; p->kind == X && a < 3; ++a) { s[a] += 1; }", "for (a = 0; good && a < 3; ++a) { good = f(a); }"),
+         ("for (i = 0; i < n && p != NULL; ++i) { p[i] = f(&p->x); }",
+          "for (i = 0; i < n && p != NULL; ++i) { p = f(p); }"),
          ("for (i = 0; i < n && left > 0; ++i) { f(i); }", "for (i = 0; i < n && left > 0; ++i) { left -= f(i); }"),
          ("for (i = 0; i < n && c->status == 0; ++i) { f(i); }", "for (i = 0; i < n && c->status == 0; ++i) { f(c); }"),
          ("x = a ? b : c ? d : e;", "x = a ? b : c; y = d ? e : f;"),

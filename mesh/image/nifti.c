@@ -222,8 +222,10 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
 static float *planes(const supine_image *image, supine_arena *arena) {
   const size_t count = image->size[0] * image->size[1] * image->size[2];
   float *made = supine_arena_take(arena, 3 * count, sizeof *made);
-  for (size_t i = 0; made != NULL && i < 3 * count; ++i) {
-    made[i % 3 * count + i / 3] = (float)supine_image_get(image, i);
+  if (made != NULL) {
+    for (size_t i = 0; i < 3 * count; ++i) {
+      made[i % 3 * count + i / 3] = (float)supine_image_get(image, i);
+    }
   }
   return made;
 }

@@ -56,7 +56,10 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
   SUPINE_FREED_BY(supine_image_free) supine_image image = first;
   w->image.values = joined;
   w->image.voxel = SUPINE_VOXEL_U8;
-  for (size_t f = 0; joined != NULL && f < count; ++f) {
+  if (joined == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t f = 0; f < count; ++f) {
     if (f > 0) {
       supine_image_free(&image);
       SUPINE_TRY(read_image(w, paths[f], &image, error));
@@ -69,7 +72,7 @@ static supine_status join_images(work *w, const char *const *paths, size_t count
           joined[i] == 0 && supine_image_get(&image, i) != 0.0 ? (uint8_t)(f + 1) : joined[i];
     }
   }
-  return joined != NULL ? SUPINE_OK : SUPINE_ERROR_MEMORY;
+  return SUPINE_OK;
 }
 
 /* Copy the bounding box of the lungs from the label map to w->both. Its voxels become 0,

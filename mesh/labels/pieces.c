@@ -77,11 +77,14 @@ supine_status supine_labels_pieces_find(const labels_mask *mask, bool zero, supi
                                         labels_pieces *pieces) {
   const size_t rows = mask->size[1] * mask->size[2];
   size_t *first = supine_arena_zeros(arena, rows + 1, sizeof *first);
-  for (size_t row = 0; first != NULL && row < rows; ++row) {
+  if (first == NULL) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t row = 0; row < rows; ++row) {
     first[row + 1] =
         first[row] + runs_of_row(mask->at + row * mask->size[0], mask->size[0], zero, NULL);
   }
-  const size_t count = first != NULL ? first[rows] : 0;
+  const size_t count = first[rows];
   labels_run *run = supine_arena_take(arena, count, sizeof *run);
   *pieces = (labels_pieces){.row = first,
                             .run = run,

@@ -178,6 +178,19 @@ static void check_belonging(const embedding *e, supine_findings *findings) {
                                   findings);
 }
 
+/* List the ranges of points that belong to one rigid part. */
+static void list_rigid(embedding *e, size_t n) {
+  for (size_t begin = 0, end = 0; begin < n; begin = end) {
+    while (end < n && e->part[end] == e->part[begin]) {
+      ++end;
+    }
+    if (e->content->rigid[e->part[begin]] && end > begin + 1) {
+      e->rigid[2 * e->rigid_count] = (uint32_t)begin;
+      e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
+    }
+  }
+}
+
 /* Sort the points by lung, in stable order, and renumber the triangles. */
 static supine_status sort_points(embedding *e, supine_inside_report *report, supine_error *error) {
   const size_t n = e->content->count;
@@ -208,14 +221,8 @@ static supine_status sort_points(embedding *e, supine_inside_report *report, sup
   for (size_t i = 0; i < 3 * e->content->triangle_count; ++i) {
     e->triangles[i] = position[e->content->triangles[i]];
   }
-  for (size_t begin = 0, end = 0; e->content->rigid != NULL && begin < n; begin = end) {
-    while (end < n && e->part[end] == e->part[begin]) {
-      ++end;
-    }
-    if (e->content->rigid[e->part[begin]] && end > begin + 1) {
-      e->rigid[2 * e->rigid_count] = (uint32_t)begin;
-      e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
-    }
+  if (e->content->rigid != NULL) {
+    list_rigid(e, n);
   }
   report->count = n;
   report->rigid = e->rigid_count;

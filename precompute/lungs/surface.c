@@ -101,9 +101,11 @@ static void find_box(const supine_lungs_surface *s, node *n, boxes *leaf) {
       supine_box_add(p[k], low, high);
       supine_box_add(p[k], n->low, n->high);
     }
-    for (int k = 0; k < 3 && leaf != NULL; ++k) {
-      leaf->low[k][i - n->begin] = nextafterf((float)low[k], -INFINITY);
-      leaf->high[k][i - n->begin] = nextafterf((float)high[k], INFINITY);
+    if (leaf != NULL) {
+      for (int k = 0; k < 3; ++k) {
+        leaf->low[k][i - n->begin] = nextafterf((float)low[k], -INFINITY);
+        leaf->high[k][i - n->begin] = nextafterf((float)high[k], INFINITY);
+      }
     }
   }
 }

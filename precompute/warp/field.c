@@ -32,8 +32,8 @@ static inline __attribute__((always_inline)) void interpolate(const supine_image
   const float *numbers = image->values;
   for (size_t c = 0; c < channels; ++c) {
     values[c] = 0.0;
-    for (size_t k = 0; k < 3 && slope != NULL; ++k) {
-      slope[c][k] = 0.0;
+    if (slope != NULL) {
+      slope[c][0] = slope[c][1] = slope[c][2] = 0.0;
     }
   }
   for (size_t corner = 0; corner < 8; ++corner) {
@@ -50,9 +50,11 @@ static inline __attribute__((always_inline)) void interpolate(const supine_image
     for (size_t c = 0; c < channels; ++c) {
       const double value = (double)numbers[channels * voxel + c];
       values[c] += weight[0] * weight[1] * weight[2] * value;
-      for (size_t k = 0; k < 3 && slope != NULL; ++k) {
-        const double sign = corner >> k & 1U ? 1.0 : -1.0;
-        slope[c][k] += sign * weight[(k + 1) % 3] * weight[(k + 2) % 3] * value;
+      if (slope != NULL) {
+        for (size_t k = 0; k < 3; ++k) {
+          const double sign = corner >> k & 1U ? 1.0 : -1.0;
+          slope[c][k] += sign * weight[(k + 1) % 3] * weight[(k + 2) % 3] * value;
+        }
       }
     }
   }

@@ -23,8 +23,10 @@ static double misfit(const supine_field *field, const double x[3], const double 
   supine_warp_interpolate(&field->nodes, &cell, u, slope);
   for (int k = 0; k < 3; ++k) {
     residual[k] = x[k] + u[k] - y[k];
-    for (int a = 0; a < 3 && slope != NULL; ++a) {
-      slope[k][a] += field->nodes.step[a][k];
+    if (slope != NULL) {
+      for (int a = 0; a < 3; ++a) {
+        slope[k][a] += field->nodes.step[a][k];
+      }
     }
   }
   return supine_length(residual);

@@ -17,12 +17,12 @@ static const double opening = 3.0;
 enum { OUTLINE = 2000 };
 
 typedef struct search {
-  const supine_image *frame; /* size and frame of the voxels */
-  unsigned char *stage;      /* [voxels] stage of the search in the upper bits */
-  bool named;                /* whether every component is a part, whatever its shape */
+  const supine_image *frame;  /* size and frame of the voxels */
+  unsigned char *stage;       /* [voxels] stage of the search in the upper bits */
+  bool named;                 /* whether every component is a part, whatever its shape */
   const supine_image *labels; /* a component has voxels of one label; NULL if it has open voxels */
   double label;
-  size_t *list;              /* the voxels of the component */
+  size_t *list; /* the voxels of the component */
   size_t count, room;
   supine_tissue *tissue;
 } search;
@@ -54,7 +54,10 @@ static bool ball_create(const supine_image *frame, double radius, supine_arena *
   }
   made->by = supine_arena_take(arena, most, sizeof *made->by);
   made->count = 0;
-  for (size_t code = 0; code < most && made->by != NULL; ++code) {
+  if (made->by == NULL) {
+    return false;
+  }
+  for (size_t code = 0; code < most; ++code) {
     size_t rest = code;
     double step[3] = {0.0, 0.0, 0.0};
     int by[3];
@@ -69,7 +72,7 @@ static bool ball_create(const supine_image *frame, double radius, supine_arena *
       memcpy(made->by[made->count++], by, sizeof by);
     }
   }
-  return made->by != NULL;
+  return true;
 }
 
 /* Mark the voxels `at` around which a ball is soft; with `open`, mark the soft voxels of the ball.
@@ -150,22 +153,24 @@ static bool take(search *s, size_t voxel) {
 static bool find_component(search *s, size_t voxel) {
   const size_t *size = s->frame->size;
   s->count = 0;
-  bool good = take(s, voxel);
-  for (size_t n = 0; n < s->count && good; ++n) {
+  if (!take(s, voxel)) {
+    return false;
+  }
+  for (size_t n = 0; n < s->count; ++n) { /* the list grows meanwhile */
     size_t stride = 1;
     size_t rest = s->list[n];
     for (size_t a = 0; a < 3; ++a) {
-      if (rest % size[a] > 0) {
-        good = good && take(s, s->list[n] - stride);
+      if (rest % size[a] > 0 && !take(s, s->list[n] - stride)) {
+        return false;
       }
-      if (rest % size[a] + 1 < size[a]) {
-        good = good && take(s, s->list[n] + stride);
+      if (rest % size[a] + 1 < size[a] && !take(s, s->list[n] + stride)) {
+        return false;
       }
       rest /= size[a];
       stride *= size[a];
     }
   }
-  return good;
+  return true;
 }
 
 /* Store the component as a mask on the voxels around it. */
@@ -359,22 +364,24 @@ static bool add_part(const search *s) {
   tissue->parts = grown;
   good = make_outline(&part);
   tissue->parts[tissue->part_count++] = part;
-  for (size_t i = 0; i < s->count && !s->named; ++i) {
-    set_stage(&s->stage[s->list[i]], SUPINE_TISSUE_PART);
+  if (!s->named) {
+    for (size_t i = 0; i < s->count; ++i) {
+      set_stage(&s->stage[s->list[i]], SUPINE_TISSUE_PART);
+    }
   }
   return good;
 }
 
 static bool find_components(search *s) {
   const size_t *size = s->frame->size;
-  bool good = true;
-  for (size_t i = 0; i < size[0] * size[1] * size[2] && good; ++i) {
-    if (has_stage(s->stage[i], SUPINE_TISSUE_CORE) || has_stage(s->stage[i], SUPINE_TISSUE_OPEN)) {
-      good = find_component(s, i) && add_part(s);
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    const bool soft =
+        has_stage(s->stage[i], SUPINE_TISSUE_CORE) || has_stage(s->stage[i], SUPINE_TISSUE_OPEN);
+    if (soft && !(find_component(s, i) && add_part(s))) {
+      return false;
     }
   }
-  free(s->list);
-  return good;
+  return true;
 }
 
 /* Return whether most voxels of the component lie in the lungs. */
@@ -398,6 +405,25 @@ static bool lies_in_lungs(const search *s, const supine_image *depth) {
   return 2 * inside > s->count;
 }
 
+/* Add the components of each label that are small enough to be compact, and lie in the lungs. */
+static bool find_labelled(search *s, const supine_image *depth) {
+  const size_t *size = s->frame->size;
+  const double most = SUPINE_COMPACT_MOST_ML / supine_warp_tissue_voxel(s->labels);
+  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
+    s->label = has_stage(s->stage[i], 0) ? supine_image_get(s->labels, i) : 0.0;
+    if (s->label == 0.0) {
+      continue;
+    }
+    if (!find_component(s, i)) {
+      return false;
+    }
+    if ((double)s->count <= most && lies_in_lungs(s, depth) && !add_part(s)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 supine_status supine_warp_tissue_find_labels(const supine_field *field, const supine_image *labels,
                                              supine_tissue *tissue, supine_error *error) {
   const size_t voxels = labels->size[0] * labels->size[1] * labels->size[2];
@@ -405,17 +431,7 @@ supine_status supine_warp_tissue_find_labels(const supine_field *field, const su
   unsigned char *stage = supine_arena_zeros(&arena, voxels, 1);
   SUPINE_TRY(supine_arena_check(&arena, error, "a label map of %zu voxels", voxels));
   search s = {.frame = labels, .stage = stage, .labels = labels, .tissue = tissue};
-  bool good = true;
-  for (size_t i = 0; i < voxels && good; ++i) {
-    s.label = has_stage(stage[i], 0) ? supine_image_get(labels, i) : 0.0;
-    if (s.label != 0.0) {
-      const double most = SUPINE_COMPACT_MOST_ML / supine_warp_tissue_voxel(labels);
-      good = find_component(&s, i);
-      if (good && (double)s.count <= most && lies_in_lungs(&s, &field->depth)) {
-        good = add_part(&s);
-      }
-    }
-  }
+  const bool good = find_labelled(&s, &field->depth);
   free(s.list);
   return good ? supine_warp_tissue_group(tissue, error)
               : supine_error_memory(error, "parts of a label map");
@@ -424,8 +440,10 @@ supine_status supine_warp_tissue_find_labels(const supine_field *field, const su
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error) {
   search s = {.frame = &tissue->kind, .stage = tissue->kind.values, .tissue = tissue};
   SUPINE_TRY(open_by_ball(&s, error));
-  return find_components(&s) ? supine_warp_tissue_group(tissue, error)
-                             : supine_error_memory(error, "parts of soft tissue");
+  const bool good = find_components(&s);
+  free(s.list);
+  return good ? supine_warp_tissue_group(tissue, error)
+              : supine_error_memory(error, "parts of soft tissue");
 }
 
 supine_status supine_warp_tissue_add_labels(const supine_image *labels, const double *wanted,
@@ -446,7 +464,9 @@ supine_status supine_warp_tissue_add_labels(const supine_image *labels, const do
                      "no voxel of the label map has the value %g: give a value that it has",
                      wanted[k]);
     search s = {.frame = labels, .stage = stage, .named = true, .tissue = tissue};
-    if (!find_components(&s)) {
+    const bool good = find_components(&s);
+    free(s.list);
+    if (!good) {
       return supine_error_memory(error, "parts of a label map");
     }
   }

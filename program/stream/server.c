@@ -406,9 +406,11 @@ void supine_stream_server_destroy(supine_stream_server *server) {
   if (server == NULL) {
     return;
   }
-  for (size_t i = 0; server->frames != NULL && i < SUPINE_STREAM_PEERS_MAX; ++i) {
-    if (server->peer[i].socket >= 0) {
-      supine_stream_peer_end(&server->peer[i], server->frames);
+  if (server->frames != NULL) {
+    for (size_t i = 0; i < SUPINE_STREAM_PEERS_MAX; ++i) {
+      if (server->peer[i].socket >= 0) {
+        supine_stream_peer_end(&server->peer[i], server->frames);
+      }
     }
   }
   if (server->listener >= 0) {

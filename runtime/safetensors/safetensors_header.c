@@ -340,12 +340,15 @@ static supine_status place_tensors(parser *p, size_t data_begin) {
     tensor->data = file->bytes + data_begin + (uintptr_t)tensor->data;
     copied += is_aligned(tensor) ? 0 : padded_size(tensor);
   }
-  file->copies = copied > 0 ? supine_safetensors_allocate(file, copied) : NULL;
-  if (copied > 0 && file->copies == NULL) {
+  if (copied == 0) {
+    return SUPINE_OK;
+  }
+  file->copies = supine_safetensors_allocate(file, copied);
+  if (file->copies == NULL) {
     return supine_error_set(p->error, SUPINE_ERROR_MEMORY, "%s: out of memory", file->name);
   }
   unsigned char *copy = file->copies;
-  for (size_t i = 0; copy != NULL && i < file->tensor_count; ++i) {
+  for (size_t i = 0; i < file->tensor_count; ++i) {
     supine_tensor *tensor = &file->tensors[i];
     if (!is_aligned(tensor)) {
       tensor->data = memcpy(copy, tensor->data, supine_safetensors_size(tensor));

@@ -47,7 +47,10 @@ static void place_base(const glb *g, size_t lung, const double *rest, size_t ver
   for (size_t axis = 0; axis < 3; ++axis) {
     xyz[axis] /= g->step;
   }
-  for (size_t j = 0; !g->options->plain && j < g->targets.count; ++j) {
+  if (g->options->plain) {
+    return;
+  }
+  for (size_t j = 0; j < g->targets.count; ++j) {
     double target[3];
     place_target(g, lung, j, vertex, target);
     for (size_t axis = 0; axis < 3; ++axis) {

@@ -156,7 +156,10 @@ json_t *supine_export_template_base64(const void *bytes, size_t size) {
   const unsigned char *from = bytes;
   size_t length = 0;
   char *text = malloc((size + 2) / 3 * 4 + 1);
-  for (size_t i = 0; text != NULL && i < size; i += 3) {
+  if (text == NULL) {
+    return NULL;
+  }
+  for (size_t i = 0; i < size; i += 3) {
     const size_t left = size - i;
     const uint32_t group = ((uint32_t)from[i] << 16) | (left > 1 ? (uint32_t)from[i + 1] << 8 : 0) |
                            (left > 2 ? (uint32_t)from[i + 2] : 0);
@@ -164,7 +167,7 @@ json_t *supine_export_template_base64(const void *bytes, size_t size) {
       text[length++] = digit <= left ? digits[group >> (18 - 6 * digit) & 63] : '=';
     }
   }
-  json_t *made = text != NULL ? json_stringn_nocheck(text, length) : NULL;
+  json_t *made = json_stringn_nocheck(text, length);
   free(text);
   return made;
 }

@@ -144,8 +144,8 @@ typedef struct paint {
   size_t tint; /* index of the colour of anatomy */
 } paint;
 
-/* Return how much of the torso is seen at a sample, 0 to 1: it fades towards the picture's edges, so
- * that it is not cut off there. */
+/* Return how much of the torso is seen at a sample, 0 to 1: it fades towards the picture's edges,
+ * so that it is not cut off there. */
 static float fade_at(const canvas *c, size_t sample) {
   static const float share = 0.18F; /* part of the width and the height over which it fades */
   const float x = ((float)(sample % c->width) + 0.5F) / (float)c->width;
@@ -153,8 +153,8 @@ static float fade_at(const canvas *c, size_t sample) {
   return smoothstep(0.0F, share, fminf(x, 1.0F - x)) * smoothstep(0.0F, share, fminf(y, 1.0F - y));
 }
 
-/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them; of the
- * torso, which is drawn first, only the nearest fragment stays. */
+/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them; of
+ * the torso, which is drawn first, only the nearest fragment stays. */
 static void blend(const canvas *c, size_t sample, material what, const fragment *at,
                   float nearness) {
   float rgba[4];
@@ -271,7 +271,10 @@ static void draw_content(const canvas *c, bool shells, const rows *drawn) {
       draw_triangle(c, now, t, (paint){solid_of(mark), mark->tint}, drawn);
     }
   }
-  for (size_t i = 0; marks != NULL && i < marks->count; ++i) {
+  if (marks == NULL) {
+    return;
+  }
+  for (size_t i = 0; i < marks->count; ++i) {
     const supine_mark *mark = &marks->mark[i];
     if (mark->radius > 0.0F) {
       draw_ball(c, &now->corners[i], mark->radius, (paint){solid_of(mark), mark->tint}, drawn);
@@ -410,8 +413,7 @@ static supine_status add_body(canvas *c, const supine_basis_info *info, supine_a
   corner *corners = supine_arena_take(keep, made.vertex_count, sizeof *corners);
   SUPINE_TRY(supine_arena_check(keep, error, "%zu vertices", made.vertex_count));
   for (size_t i = 0; i < made.vertex_count; ++i) {
-    corners[i] =
-        supine_render_camera_project(&c->camera, made.xyz + 3 * i, made.normals + 3 * i);
+    corners[i] = supine_render_camera_project(&c->camera, made.xyz + 3 * i, made.normals + 3 * i);
   }
   c->layers[LAYER_BODY] = (layer){corners, made.triangles, made.triangle_count};
   return SUPINE_OK;
@@ -495,8 +497,8 @@ static void add_triangles(canvas *c, layer_name name) {
 static supine_status add_items(canvas *c, supine_arena *keep, supine_error *error) {
   const supine_marks *marks = c->scene->content;
   const size_t points = marks != NULL ? marks->count : 0;
-  const size_t most = c->layers[LAYER_LUNGS].triangle_count +
-                      2 * c->layers[LAYER_BEFORE].triangle_count + points;
+  const size_t most =
+      c->layers[LAYER_LUNGS].triangle_count + 2 * c->layers[LAYER_BEFORE].triangle_count + points;
   c->items = supine_arena_take(keep, most, sizeof *c->items);
   SUPINE_TRY(supine_arena_check(keep, error, "%zu triangles", most));
   add_triangles(c, LAYER_LUNGS);
