@@ -297,6 +297,19 @@ supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pa
   return SUPINE_OK;
 }
 
+void supine_patient_check_volume(const supine_volume *named, double held,
+                                 supine_findings *findings) {
+  if (named->kind != SUPINE_VOLUME_ABSOLUTE || held <= 0.0 || named->ml <= 0.0) {
+    return;
+  }
+  if (is_told(SUPINE_INPUT_PATIENT_VOLUME, fmax(held / named->ml, named->ml / held))) {
+    supine_findings_warn(findings,
+                         "a scan holds %.0f mL, but its state says %.0f mL: correct the state, or "
+                         "the unit of the scan",
+                         held, named->ml);
+  }
+}
+
 void supine_patient_check_size(const supine_lungs *lungs, const double low[3], const double high[3],
                                double volume, supine_findings *findings) {
   const double held = lungs->volume[0] + lungs->volume[1];

@@ -65,6 +65,12 @@ supine_status supine_patient_check_order(const supine_patient_pairs *pairs, doub
 supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pairs *pairs,
                                              supine_findings *findings, supine_error *error);
 
+/** Warn if a scan holds another volume than its state names. States from rest or full inflation name
+ * none.
+ * @param held  volume of the scan, mL; 0 if unknown */
+void supine_patient_check_volume(const supine_volume *named, double held,
+                                 supine_findings *findings);
+
 /** Warn if lungs have another size than in the scan of the fit: width, depth, height or volume.
  * @param low, high  bounding box of the scan that was fitted, mm
  * @param volume     its volume, mL, or 0 if unknown */

@@ -139,6 +139,7 @@ static void set_states(supine_patient_scans *scans, supine_patient_record *recor
     const supine_volume *volume = &record->state[k].volume;
     const supine_lungs *lungs = &scans->lungs[k];
     record->volume[k] = volume_of(lungs);
+    supine_patient_check_volume(volume, record->volume[k], &scans->findings);
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
       record->measured_lung[k][lungs->side[lung] > 0 ? 0 : 1] = lungs->volume[lung];
     }

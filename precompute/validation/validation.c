@@ -103,6 +103,8 @@ void supine_validation_check_person(const supine_validation *subject, size_t i,
                                     const supine_lungs *scan, supine_findings *findings) {
   const supine_basis_info *info = supine_basis_get_info(subject->basis);
   supine_patient_size size[2] = {{.volume = {0.0}}, supine_patient_size_of(scan)};
+  supine_patient_check_volume(&subject->state[i].state.volume,
+                              size[1].volume[0] + size[1].volume[1], findings);
   if (supine_distance(subject->state[i].state.gravity, subject->from.state.gravity) >=
       same_posture) {
     return;

@@ -88,7 +88,8 @@ supine_status supine_validation_check_landmarks(const supine_validation *subject
                                                 supine_findings *findings, supine_error *error);
 
 /* Warn if the lungs of the scan of state i and those in the state in which the motion starts are
- * hardly of one person (supine_patient_check_person). Scans in another posture are not compared. */
+ * hardly of one person (supine_patient_check_person), or a scan holds another volume than its state
+ * names. Scans in another posture are not compared. */
 void supine_validation_check_person(const supine_validation *subject, size_t i,
                                     const supine_lungs *scan, supine_findings *findings);
 
