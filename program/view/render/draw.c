@@ -2,7 +2,6 @@
 /* Draw the lungs and what is inside them: opaque surfaces by the nearest triangle at each sample,
  * then translucent ones from the farthest to the nearest. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/arena.h"
@@ -458,13 +457,33 @@ static supine_status add_content(canvas *c, bool before, supine_arena *keep, sup
   return SUPINE_OK;
 }
 
-static int by_nearness(const void *a, const void *b) {
-  const item *p = a;
-  const item *q = b;
-  if (p->nearness != q->nearness) {
-    return p->nearness < q->nearness ? -1 : 1;
+static uint32_t digit_of(float number, unsigned shift, uint32_t mask) {
+  uint32_t bits;
+  memcpy(&bits, &number, sizeof bits);
+  return bits >> shift & mask;
+}
+
+/* Sort the items from the farthest to the nearest, digit by digit of the bits of their nearness: a
+ * number from 0 on orders as its bits do. Return the sorted items, which are in `items` or `spare`.
+ */
+static item *sort_items(item *items, item *spare, size_t count) {
+  enum { BITS = 11, VALUES = 1 << BITS, ALL_BITS = 32 };
+  for (unsigned shift = 0; shift < ALL_BITS; shift += BITS) {
+    size_t begin[VALUES + 1] = {0};
+    item *sorted = spare;
+    for (size_t i = 0; i < count; ++i) {
+      ++begin[digit_of(items[i].nearness, shift, VALUES - 1) + 1];
+    }
+    for (size_t value = 0; value < VALUES; ++value) {
+      begin[value + 1] += begin[value];
+    }
+    for (size_t i = 0; i < count; ++i) {
+      sorted[begin[digit_of(items[i].nearness, shift, VALUES - 1)]++] = items[i];
+    }
+    spare = items;
+    items = sorted;
   }
-  return (p->index > q->index) - (p->index < q->index);
+  return items;
 }
 
 /* A ghost is drawn where the selected target was, if it has moved. */
@@ -500,6 +519,7 @@ static supine_status add_items(canvas *c, supine_arena *keep, supine_error *erro
   const size_t most =
       c->layers[LAYER_LUNGS].triangle_count + 2 * c->layers[LAYER_BEFORE].triangle_count + points;
   c->items = supine_arena_take(keep, most, sizeof *c->items);
+  item *spare = supine_arena_take(keep, most, sizeof *spare);
   SUPINE_TRY(supine_arena_check(keep, error, "%zu triangles", most));
   add_triangles(c, LAYER_LUNGS);
   add_triangles(c, LAYER_BEFORE);
@@ -510,7 +530,7 @@ static supine_status add_items(canvas *c, supine_arena *keep, supine_error *erro
           (item){c->layers[LAYER_BEFORE].corners[i].nearness, (uint32_t)i, LAYER_BEFORE, true};
     }
   }
-  qsort(c->items, c->item_count, sizeof *c->items, by_nearness);
+  c->items = sort_items(c->items, spare, c->item_count);
   return SUPINE_OK;
 }
 
