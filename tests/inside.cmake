@@ -13,6 +13,9 @@ add_test(NAME names COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts
 # Compare results with those of nibabel, VTK and other tools that are installed.
 add_test(NAME labels_orientation COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_labels_orientation.py $<TARGET_FILE:supine>)
+add_test(NAME segmentation COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_segmentation.py
+  $<TARGET_FILE:supine> ${PROJECT_SOURCE_DIR}/examples/lungs ${PROJECT_SOURCE_DIR}/docs/guide)
+set_tests_properties(segmentation PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 add_test(NAME foreign_tools COMMAND /usr/bin/python3
   ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_foreign_tools.py $<TARGET_FILE:supine>)
 set_tests_properties(foreign_tools PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)

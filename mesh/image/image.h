@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file Read and write three-dimensional images and label maps (NRRD, NIfTI and MetaImage). In
- * memory, positions are in mm and LPS, whatever axes the file has. */
+/** @file Read and write three-dimensional images and label maps (NRRD, NIfTI and MetaImage), and
+ * read DICOM segmentations. In memory, positions are in mm and LPS, whatever axes the file has. */
 #ifndef SUPINE_IMAGE_H
 #define SUPINE_IMAGE_H
 
@@ -37,6 +37,9 @@ typedef struct supine_image {
   supine_axes axes;         /**< axes assumed for the coordinates in the header */
   const char *frame_source; /**< header field that gives origin and steps, a string literal:
                                "sform", "qform", "space directions" or "TransformMatrix" */
+  /** Whether the file is a DICOM segmentation, whose voxels have the numbers of their segments. */
+  bool is_segmentation;
+  char lungs[256];    /**< its lungs, if its codes name them: "left=3+4,right=5"; otherwise "" */
   bool frames_differ; /**< whether a NIfTI file's qform and sform differ by half a voxel or more */
 } supine_image;
 
@@ -46,9 +49,10 @@ bool supine_image_supports(const char *path);
 /** Return whether the name's ending is that of any image format, even one that cannot be read. */
 bool supine_image_is_named(const char *path);
 
-/** Read an image of one number per voxel. If a NIfTI header gives a slope and an intercept, the
- * voxels are scaled and stored as F32.
- * Files that refer to other files, or have no orientation, are refused.
+/** Read an image of one number per voxel, or a DICOM segmentation (.dcm) by DCMTK's dcm2json. If a
+ * segmentation names lungs by their codes, its other segments are skipped. If a NIfTI header gives
+ * a slope and an intercept, the voxels are scaled and stored as F32. Files that refer to other
+ * files, or have no orientation, are refused.
  * @param image  zero-initialised; written only on success
  * Memory: the voxels, at most 1,032 times the file's size, because gzip expands no further. */
 supine_status supine_image_read(const char *path, supine_image *image, supine_error *error);

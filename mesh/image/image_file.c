@@ -66,11 +66,18 @@ supine_status supine_image_read(const char *path, supine_image *image, supine_er
   SUPINE_FREED_BY(supine_file_close) FILE *file = NULL;
   size_t size = 0;
   image_storage storage = {0};
-  SUPINE_REFUSE_IF(!supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
-                   "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha; convert other "
-                   "formats, for example with 3D Slicer",
+  const bool dicom = supine_text_ends_in(path, ".dcm");
+  SUPINE_REFUSE_IF(!dicom && !supine_image_supports(path), error, SUPINE_ERROR_FORMAT,
+                   "%s: an image's name must end in .nrrd, .nii, .nii.gz or .mha, or .dcm for a "
+                   "DICOM segmentation; convert other formats, for example with 3D Slicer",
                    path);
   SUPINE_TRY(supine_input_open(path, &file, &size, error));
+  if (dicom) {
+    SUPINE_TRY(supine_image_read_segmentation(path, &read, error));
+    *image = read;
+    read.values = NULL;
+    return SUPINE_OK;
+  }
   SUPINE_TRY(formats[format_of(path)].describe(path, file, &read, &storage, error));
   SUPINE_REFUSE_IF(!is_frame(&read), error, SUPINE_ERROR_FORMAT,
                    "%s: the header's axis directions are linearly dependent: write the image again",

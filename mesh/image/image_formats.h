@@ -31,6 +31,10 @@ typedef supine_status image_write(const char *path, const supine_image *image, c
 image_describe supine_image_describe_nrrd, supine_image_describe_nifti, supine_image_describe_mha;
 image_write supine_image_write_nrrd, supine_image_write_nifti, supine_image_write_mha;
 
+/* Read a DICOM segmentation as a label map. */
+supine_status supine_image_read_segmentation(const char *path, supine_image *image,
+                                             supine_error *error);
+
 /* Formats of compressed streams; the values are zlib's window bits. */
 enum { IMAGE_ZLIB = 15, IMAGE_GZIP = 31 };
 

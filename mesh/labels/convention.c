@@ -149,8 +149,8 @@ static bool choose_by_presence(const supine_image *image, const labels_tally *ta
 }
 
 /* Refuse five lobes of which 1, 2 and 3 are one lung and lie to the right of 4 and 5: LTRCLobes
- * numbers those of the left lung first, other programs those of the right lung. In a mirrored map of
- * LTRCLobes, 3 lies with 4 and 5. If a lobe is missing, refuse nothing. */
+ * numbers those of the left lung first, other programs those of the right lung. In a mirrored map
+ * of LTRCLobes, 3 lies with 4 and 5. If a lobe is missing, refuse nothing. */
 static supine_status check_lobes(const char *path, const supine_image *image,
                                  const labels_tally *tally, supine_error *error) {
   enum { LOBES = 5, THIRD = 2 };
@@ -189,7 +189,11 @@ static supine_status choose(const char *path, const supine_image *image, const l
     memset(side + 1 + options->left_masks, LABELS_RIGHT, options->right_masks);
     return SUPINE_OK;
   }
-  if (wanted == NULL && choose_by_presence(image, tally, side, name)) {
+  if (wanted == NULL && image->lungs[0] != '\0') {
+    wanted = image->lungs;
+    *name = "SNOMED CT";
+  }
+  if (wanted == NULL && !image->is_segmentation && choose_by_presence(image, tally, side, name)) {
     return SUPINE_OK;
   }
   if (wanted == NULL) {

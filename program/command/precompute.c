@@ -339,7 +339,9 @@ const supine_command supine_command_precompute = {
              "the run-time library compute deformed lungs in real time. MESH is any surface that "
              "assimp reads (PLY, OBJ, STL, "
              "OFF, ...), with both lungs in one file or a file for each; LABELS is the label map "
-             "of a segmentation (NRRD, NIfTI, MetaImage). Surfaces must be closed.",
+             "of a segmentation (NRRD, NIfTI, MetaImage, or DICOM SEG, for which dcm2json of DCMTK "
+             "must be "
+             "installed). Surfaces must be closed.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"

@@ -137,13 +137,15 @@ const supine_option supine_options_model[] = {
      "box of two lungs, or the medial side of a single lung",
      FILLS(precompute.lungs.midline), GIVEN(precompute.lungs.has_midline), SUPINE_MEASURES(LENGTH),
      .more = true},
-    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha) instead of surfaces: one map, one mask per "
-             "file, or the folder of masks that TotalSegmentator writes:"},
+    {.help = "Label maps (.nrrd, .nii, .nii.gz, .mha, or .dcm for a DICOM segmentation) instead of "
+             "surfaces: one map, one mask per file, or the folder of masks that TotalSegmentator "
+             "writes:"},
     {"labels", 0, "WHICH",
      "labels of the lungs: lungmask (1 right, 2 left), lobes (1, 2 left, 3 to 5 right), "
      "totalsegmentator (10 to 14), totalsegmentator-v1 (13 to 17), one (every label but 0 is lung; "
      "left and right are separated), or a list such as left=10+11,right=12+13+14, or left=2 for "
-     "one lung. By default, the labels in the map decide, if they are unambiguous",
+     "one lung. By default, the labels in the map decide, if they are unambiguous; of a DICOM "
+     "segmentation, the SNOMED codes of its segments, whose numbers are the labels",
      FILLS(precompute.lungs.labels)},
     {"edge", 0, "MM", "edge length of the surface's triangles; default 2",
      FILLS(precompute.lungs.edge), .range = {0.2, 20.0}, SUPINE_MEASURES(LENGTH), .more = true},

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Test that `supine precompute` reads DICOM segmentations: pydicom writes the lobes of real lungs, and the surfaces
+equal those of the same labels in NIfTI, whose volumes nibabel gives. Other objects are refused with a remedy.
+
+    test_segmentation.py SUPINE EXAMPLES_FOLDER GUIDE_FOLDER
+
+Exit with 77 if pydicom, nibabel or dcm2json is missing."""
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+
+try:
+    import nibabel
+    import numpy as np
+    from pydicom.dataset import Dataset, FileMetaDataset
+    from pydicom.uid import ExplicitVRLittleEndian, generate_uid
+except ImportError as error:
+    print(f"skipped: {error}")
+    sys.exit(77)
+if shutil.which("dcm2json") is None:
+    print("skipped: dcm2json (dcmtk) is missing")
+    sys.exit(77)
+
+supine, lungs, guide = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+SEG, RTSTRUCT, CT = "1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.481.3", "1.2.840.10008.5.1.4.1.1.2"
+# Segments: the file of a lobe, and its code in SNOMED CT.
+LOBES = {"lung_upper_lobe_left": "45653009", "lung_lower_lobe_left": "90572001", "lung_upper_lobe_right": "42400003",
+         "lung_middle_lobe_right": "72481006", "lung_lower_lobe_right": "266005"}
+NUMBERS = {name: number for number, name in enumerate(LOBES, 3)}
+
+
+def items(**members):
+    made = Dataset()
+    for name, value in members.items():
+        setattr(made, name, value)
+    return [made]
+
+
+def write(path, masks, codes, affine, fractional=False, kind=SEG, syntax=ExplicitVRLittleEndian, shift=0.0):
+    """Write {number: mask [i, j, k]} as a segmentation, its frames in any order and without those that are empty."""
+    lps = np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
+    spacing = np.linalg.norm(lps[:3, :3], axis=0)
+    one = Dataset()
+    one.file_meta = FileMetaDataset()
+    one.file_meta.MediaStorageSOPClassUID, one.file_meta.TransferSyntaxUID = kind, syntax
+    one.file_meta.MediaStorageSOPInstanceUID = one.SOPInstanceUID = generate_uid()
+    one.is_little_endian, one.is_implicit_VR = True, False
+    one.SOPClassUID, one.Modality, one.PatientID = kind, "SEG", "synthetic"
+    one.SegmentationType = "FRACTIONAL" if fractional else "BINARY"
+    one.Rows, one.Columns = next(iter(masks.values())).shape[1::-1]
+    one.SegmentSequence = [
+        items(SegmentNumber=number, SegmentLabel=f"segment {number}", SegmentedPropertyTypeCodeSequence=items(
+            CodeValue=codes.get(number, "10200004"), CodingSchemeDesignator="SCT", CodeMeaning="a part"))[0]
+        for number in masks]
+    one.SharedFunctionalGroupsSequence = items(
+        PixelMeasuresSequence=items(PixelSpacing=[spacing[1], spacing[0]], SliceThickness=spacing[2],
+                                    SpacingBetweenSlices=spacing[2]),
+        PlaneOrientationSequence=items(ImageOrientationPatient=[*lps[:3, 0] / spacing[0], *lps[:3, 1] / spacing[1]]))
+    frames = [(number, k) for number, mask in masks.items() for k in range(mask.shape[2]) if mask[:, :, k].any()]
+    random.Random(3).shuffle(frames)
+    one.NumberOfFrames, one.PerFrameFunctionalGroupsSequence, planes = len(frames), [], []
+    for index, (number, k) in enumerate(frames):
+        at = lps[:3, 3] + k * lps[:3, 2] + (shift if index == 5 else 0.0)
+        one.PerFrameFunctionalGroupsSequence += items(
+            PlanePositionSequence=items(ImagePositionPatient=[f"{x:.6f}" for x in at]),
+            SegmentIdentificationSequence=items(ReferencedSegmentNumber=number))
+        planes.append(masks[number][:, :, k].T.ravel())
+    if fractional:
+        one.MaximumFractionalValue, one.BitsAllocated = 200, 8
+        content = (np.concatenate(planes) * 120 + 40).astype(np.uint8).tobytes()
+    else:
+        one.BitsAllocated = 1
+        content = np.packbits(np.concatenate(planes), bitorder="little").tobytes()
+    one.SamplesPerPixel, one.BitsStored = 1, one.BitsAllocated
+    one.add_new((0x7FE0, 0x0010), "OB", content + bytes(len(content) % 2))
+    one.save_as(path, write_like_original=False)
+
+
+def run(*arguments):
+    done = subprocess.run([supine, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          check=False)
+    return done.returncode, done.stdout
+
+
+def surfaces(source, *options):
+    code, said = run("precompute", source, *options, "-o", "made.safetensors", "--surfaces-out", "made.ply",
+                     "--band", "2", "--held-out", "20", "--scanned", "full", "--edge", "12")
+    assert code == 0, (source, said)
+    header, content = pathlib.Path("made.ply").read_bytes().split(b"end_header\n", 1)
+    count = int(header.split(b"element vertex ")[1].split(b"\n")[0])
+    return np.frombuffer(content, "<f4", 3 * count), content[12 * count:], said
+
+
+def refused(code, words, source, *options):
+    found, said = run("precompute", source, *options, "-o", "none.safetensors")
+    assert found == code and words in said, (source, found, said)
+    assert not os.path.exists("none.safetensors")
+
+
+with tempfile.TemporaryDirectory() as folder:
+    os.chdir(folder)
+    subprocess.run([sys.executable, guide / "synthetic_ct.py", lungs / "left.obj", lungs / "right.obj"], check=True,
+                   stdout=subprocess.DEVNULL)
+    images = {name: nibabel.load(f"segmentation/{name}.nii.gz") for name in LOBES}
+    affine = next(iter(images.values())).affine
+    codes = {NUMBERS[name]: code for name, code in LOBES.items()}
+    labels = np.zeros(next(iter(images.values())).shape, np.uint8)
+    for name, image in images.items():  # the lungs overlap a little
+        labels[np.asarray(image.dataobj) > 0] = NUMBERS[name]
+    masks = {number: labels == number for number in codes}
+    nibabel.save(nibabel.Nifti1Image(labels, affine), "labels.nii.gz")
+    liver = np.zeros_like(labels, bool)
+    liver[5:9, 5:9, :] = labels[5:9, 5:9, :] == 0
+    everything = {1: np.ones_like(liver), 2: liver, **masks}  # the body overlaps all others
+
+    expected, triangles, said = surfaces("labels.nii.gz", "--labels", "left=3+4,right=5+6+7")
+    volume = {side: sum(masks[n].sum() for n in numbers) * abs(np.linalg.det(affine)) / 1000
+              for side, numbers in (("left", (3, 4)), ("right", (5, 6, 7)))}
+    write("binary.dcm", everything, codes, affine)
+    write("fractional.dcm", masks, codes, affine, fractional=True)
+    write("uncoded.dcm", masks, {}, affine)
+    for source, options in (("binary.dcm", ()), ("fractional.dcm", ()),
+                            ("uncoded.dcm", ("--labels", "left=3+4,right=5+6+7"))):
+        found, corners, said = surfaces(source, *options)
+        assert corners == triangles and np.abs(found - expected).max() < 1e-3, source  # NIfTI's header has float32
+        for side, value in volume.items():
+            assert f"{side} lung: {value:.1f} mL" in said, (side, value, said)
+
+    refused(2, "which of its labels", "uncoded.dcm")
+    write("liver.dcm", {1: liver}, {}, affine)
+    refused(2, "which of its labels (1) are lungs", "liver.dcm")
+    write("overlap.dcm", {1: masks[3], 2: masks[3] | masks[4]}, {}, affine)
+    refused(3, "overlap in frame", "overlap.dcm")
+    write("shifted.dcm", masks, codes, affine, shift=1.0)
+    refused(3, "beside the grid of the others", "shifted.dcm")
+    write("contours.dcm", {1: liver}, {}, affine, kind=RTSTRUCT)
+    refused(3, "RTSTRUCT", "contours.dcm")
+    write("ct.dcm", {1: liver}, {}, affine, kind=CT)
+    refused(3, "no DICOM segmentation", "ct.dcm")
+    content = pathlib.Path("binary.dcm").read_bytes()
+    for size in (0, 200, len(content) // 2):
+        pathlib.Path("cut.dcm").write_bytes(content[:size])
+        refused(2, "cut.dcm", "cut.dcm")
+    refused(2, "absent.dcm", "absent.dcm")
+    os.environ["PATH"] = "/nowhere"
+    refused(3, "dcm2json, which is missing", "binary.dcm")
+print("segmentations are read")
