@@ -262,6 +262,8 @@ for (const [width, height, colorScheme, chosen] of [
       .first()
       .boundingBox()
       .then((box) => box.y);
+  const wide = (cell) => sized.locator(cell).first().boundingBox().then((box) => box.width);
+  assert.ok((await wide('#inside-rows th')) > 0.3 * (await wide('#inside-rows tr')), `${width}: names have no room`);
   if (width < 800)
     assert.ok(
       (await top('#stage')) < (await top('#finding')) &&
