@@ -15,7 +15,7 @@ function drawNotes() {
   notes.taken = [];
   const small = width < 520;
   let below = null; // place under the lens, [from the right, from the top]
-  const [x, y] = [small ? 34 : width - 44, height - (small ? 100 : 92)];
+  const [x, y] = width < LENS_WIDE ? [34, height - 150] : [width - 44, height - 92]; // beside the lens's words
   notes.gravity(pane, x, y, width);
   notes.taken.push([x - 34, y - 62, x + 34, y + 44]);
   const isShown = inside && state.inside && state.moment && !state.turning;

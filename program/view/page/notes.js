@@ -72,6 +72,8 @@ function drawTrace(context, was, at, radius, ring) {
     drawArrow(context, was, at, Math.min(radius > 20 ? 13 : 7, 0.6 * Math.hypot(at[0] - was[0], at[1] - was[1])));
 }
 
+const LENS_WIDE = 720; // width of a picture in which the lens has its words beside it, units of notes
+
 /** The canvas with the notes. `taken` has the boxes [left, top, right, bottom] that names may not cover. */
 class Notes {
   constructor(canvas) {
@@ -166,7 +168,7 @@ class Notes {
     const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
     if (!was || !at) return null;
     const scale = 1 / (pane.pixel * unit); // units for each mm
-    const narrow = width < 720;
+    const narrow = width < LENS_WIDE;
     const size = Math.min(92, height * 0.2, width * 0.15);
     const middle = [width - size - (narrow ? 10 : 172), size + 12];
     const ring = ringOf(target, state.day);
