@@ -32,9 +32,9 @@ static double next_normal(uint64_t *state) {
 }
 
 /* Begin the stream of one part of a sample. */
-static uint64_t begin_stream(uint64_t seed, size_t index, size_t part) {
-  uint64_t state = seed ^ (uint64_t)index * UINT64_C(0xD1342543DE82EF95) ^
-                   (uint64_t)(part + 1) * UINT64_C(0xAEF17502108EF2D9);
+static uint64_t begin_stream(uint64_t seed, uint64_t index, uint64_t part) {
+  uint64_t state =
+      seed ^ index * UINT64_C(0xD1342543DE82EF95) ^ (part + 1) * UINT64_C(0xAEF17502108EF2D9);
   (void)next_uniform(&state);
   return state;
 }
@@ -114,7 +114,7 @@ supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint6
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "state %zu: give one below %zu", state,
                             doubt->state_count);
   }
-  uint64_t stream = begin_stream(seed, index, SIZE_MAX - 1);
+  uint64_t stream = begin_stream(seed, index, UINT64_MAX - 1);
   for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
     factor[v] = next_normal(&stream);
   }

@@ -112,6 +112,19 @@ export interface Basis {
   expectedError(since?: State): Float32Array;
   /** Return the expected error of a position on another day than that of the scan, mm, from that in its session. */
   anotherDay(sameSession: number): number;
+  /** Compute the predicted positions [3 n], mm, of at most 64 vertices in the pose, and the covariance [3 n, 3 n] of their
+   * errors, mm^2, by rows: what is asked of several points together, as of a distance, follows from it. Equations:
+   * <supine/doubt.h>. Needs the option `doubt` of `open`, as the next two do. @throws SupineError */
+  covariance(vertices: ArrayLike<number>, options?: DoubtOptions): { mean: Float64Array; covariance: Float64Array };
+  /** Register the pose at 3 to 300 vertices, spread around the targets: find the rigid motion, rotation [3, 3] by rows and
+   * translation in mm, that moves their positions closest to those in the scan, and the expected error [N] that is then
+   * left, mm. The next call overwrites `error`. @throws SupineError */
+  registration(fiducials: ArrayLike<number>, options?: DoubtOptions):
+    { rotation: number[]; translation: number[]; error: Float32Array };
+  /** Compute plausible lungs around those of the pose, in `positions`: number `index` of those that `seed` draws, the same
+   * as of 'supine deform --samples'. Lungs have the volumes of the pose. The first sample of a pose takes longer.
+   * @throws SupineError */
+  sample(index: number, options?: { seed?: number; anotherDay?: boolean }): Float32Array;
   /** Compute where each named structure of a basis made by 'supine embed' is in the pose, and how far it has moved from
    * the state `since`, or from the scan. `positions` are then those of the pose.
    * @throws SupineError */
@@ -136,6 +149,14 @@ export interface OpenOptions {
   exact?: boolean;
   /** Replace the checksum UNSEALED of a file that was made in memory by that of its content. */
   seal?: boolean;
+  /** Reserve memory for `covariance`, `registration` and `sample`: 24 bytes a vertex and lung, and 0.8 MB. */
+  doubt?: boolean;
+}
+
+/** State whose positions are exact, if it is not the scan's, and whether the lungs are those of another day. */
+export interface DoubtOptions {
+  since?: State;
+  anotherDay?: boolean;
 }
 
 /** Metadata "checksum" of a file that `open` completes with its option `seal`. */

@@ -15,6 +15,10 @@ const EXACT = 1; // SUPINE_STORAGE_EXACT
 const FRAME = 24; // SUPINE_GL_FRAME_FLOATS
 const KINDS_OF_VOLUME = { rest: 1, full: 2, scan: 3 }; // supine_volume_kind
 const JAVASCRIPT = 2; // SUPINE_WORDS_JAVASCRIPT
+// Bytes of supine_doubt_task; most fiducials, and most vertices of a covariance.
+const TASK = 24;
+const FIDUCIALS = 300;
+const TOGETHER = 64;
 const NOT_FINITE = 'the pose has a weight or a gain that is not finite: give a smaller gain';
 /** Metadata "checksum" of a file that open() completes (its option `seal`). */
 export const UNSEALED = 'xxh64:0000000000000000';
@@ -94,6 +98,8 @@ class Basis {
   #normals;
   #expected;
   #facts;
+  #doubt; // memory for what is asked of the field of the expected error; undefined unless it was asked for
+  #drawn; // prepared samples, and the state that they are of
   #isChecked = false; // whether the pose is that of the state, which poseScan does not set
   #sinceFindings = []; // of the state from which the last targets have moved
 
@@ -110,6 +116,7 @@ class Basis {
     this.#facts = this.#allocate(FACT.size * FACT.most);
     this.#readLungs(info);
     this.#makeUniforms();
+    if (options.doubt) this.#reserveDoubt();
 
     // The memory does not grow any more, so that these views stay valid.
     this.positions = this.#view(Float32Array, this.#positions, 3 * this.vertexCount);
@@ -327,6 +334,76 @@ class Basis {
     return this.#c.supine_expected_another_day(sameSession);
   }
 
+  #reserveDoubt() {
+    const { supine_doubt_space: field, supine_doubt_frame_space: frame, supine_doubt_mend_space: mend } = this.#c;
+    const each = 3 * TOGETHER;
+    const sizes = [TASK / 8, field(1), frame(FIDUCIALS), mend(this.#basis), FIDUCIALS, each + each * each];
+    const at = sizes.map((size) => this.#allocate(8 * size));
+    this.#doubt = { task: at[0], field: at[1], frame: at[2], mend: at[3], list: at[4], numbers: at[5] };
+  }
+
+  /** Prepare the field of the expected error in the state of the pose; return its address. */
+  #prepareDoubt(since, anotherDay = false) {
+    if (this.#doubt === undefined) throw refusal('no memory is reserved for this: open the basis with { doubt: true }');
+    if (since !== undefined) this.#read(since);
+    this.#drawn = undefined; // the field is in the same memory
+    const { task, field } = this.#doubt;
+    const from = since === undefined ? 0 : this.#nextState;
+    this.#view(Uint32Array, task, 5).set([this.#basis, 1, this.#state, from, anotherDay ? 1 : 0]);
+    this.#check(this.#c.supine_doubt_prepare(task, field, this.#text, this.#error));
+    return this.#word(this.#text);
+  }
+
+  /** Write vertices, `words` numbers for each, to the reserved list. */
+  #list(vertices, most, words) {
+    if (vertices.length > most) throw refusal(`${vertices.length} vertices: give at most ${most}`);
+    const rows = Array.from(vertices, (vertex) => [number(vertex, 'vertex'), 0].slice(0, words));
+    this.#view(Uint32Array, this.#doubt.list, words * vertices.length).set(rows.flat());
+    return this.#doubt.list;
+  }
+
+  covariance(vertices, { since, anotherDay } = {}) {
+    const field = this.#prepareDoubt(since, anotherDay);
+    const [count, { numbers }] = [3 * vertices.length, this.#doubt];
+    const list = this.#list(vertices, TOGETHER, 2);
+    const matrix = numbers + 8 * count;
+    this.#check(this.#c.supine_doubt_covariance(field, count / 3, list, numbers, matrix, this.#error));
+    const [mean, covariance] = [this.#view(Float64Array, numbers, count), this.#view(Float64Array, matrix, count ** 2)];
+    return { mean: mean.slice(), covariance: covariance.slice() };
+  }
+
+  registration(fiducials, { since, anotherDay } = {}) {
+    const field = this.#prepareDoubt(since, anotherDay);
+    const list = this.#list(fiducials, FIDUCIALS, 1);
+    const { frame, numbers } = this.#doubt;
+    this.#check(this.#c.supine_doubt_frame_prepare(field, fiducials.length, list, frame, this.#text, this.#error));
+    this.#c.supine_doubt_frame_motion(frame, numbers, numbers + 8 * 9);
+    this.#evaluate(this.#c.supine_doubt_frame_errors(frame, 0, this.vertexCount, this.#expected));
+    const motion = Array.from(this.#view(Float64Array, numbers, 12));
+    const error = this.#view(Float32Array, this.#expected, this.vertexCount);
+    return { rotation: motion.slice(0, 9), translation: motion.slice(9), error };
+  }
+
+  sample(index, { seed = 0, anotherDay = false } = {}) {
+    const drawn = this.#prepareSamples(anotherDay);
+    const [of, at] = [BigInt(number(seed, 'seed')), number(index, 'index')];
+    this.#check(this.#c.supine_doubt_sample(drawn.field, 0, of, at, this.#positions, this.#error));
+    this.#check(this.#c.supine_doubt_mend_sample(drawn.mend, this.#positions, this.#error));
+    return this.positions;
+  }
+
+  /** Prepare samples of the pose, unless the last ones were of it. */
+  #prepareSamples(anotherDay) {
+    const bytes = this.#doubt && this.#view(Uint8Array, this.#state, STATE).join();
+    const key = `${bytes} ${anotherDay}`;
+    if (this.#drawn?.key !== key) {
+      const field = this.#prepareDoubt(undefined, anotherDay);
+      this.#check(this.#c.supine_doubt_mend_prepare(field, 0, this.#doubt.mend, this.#text, this.#error));
+      this.#drawn = { key, field, mend: this.#word(this.#text) };
+    }
+    return this.#drawn;
+  }
+
   /** Return expectedError(since), or NaN for each vertex of another simulator's fields, whose error is unknown. */
   #expectedOrUnknown(since) {
     try {
@@ -471,10 +548,10 @@ async function moduleOf(wasm) {
   }
 }
 
-export async function open(source, { wasm, allowFolds = false, exact = false, seal = false } = {}) {
+export async function open(source, { wasm, allowFolds = false, exact = false, seal = false, doubt = false } = {}) {
   const [bytes, module] = [await bytesOf(source), await moduleOf(wasm)];
   // The C library imports functions that write to files, for printf. Refuse every call.
   const none = () => 52; // the error ENOSYS of WASI
   const imports = { wasi_snapshot_preview1: { fd_close: none, fd_seek: none, fd_write: none } };
-  return new Basis(await WebAssembly.instantiate(module, imports), bytes, { allowFolds, exact, seal });
+  return new Basis(await WebAssembly.instantiate(module, imports), bytes, { allowFolds, exact, seal, doubt });
 }

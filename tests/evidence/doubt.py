@@ -66,7 +66,7 @@ def person(case, folder):
         if np.linalg.svd(inhaled[six] - inhaled[six].mean(0))[1][2] >= 50:
             turn, shift = rigid(out[six], mean[six])
             rest = np.setdiff1d(np.arange(len(out)), six)
-            after = inside.registered_error(f"supine:{volume:.0f}mL", [order[f] for f in six])[order].astype(float)
+            after = inside.registration(f"supine:{volume:.0f}mL", [order[f] for f in six])[2][order].astype(float)
             targets.append((((mean - out @ turn.T - shift) ** 2).sum(1)[rest], after[rest] ** 2))
     return np.array(distances), np.concatenate([t for t, _ in targets]), np.concatenate([s for _, s in targets])
 

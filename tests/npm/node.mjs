@@ -16,12 +16,13 @@ const bytes = readFileSync(demo);
 
 await checkAll(async (basis, states) => pose(await open(readFileSync(basis)), states));
 
-/* supine.wasm has at most 150 kB, and at most 56 kB if compressed: 51 before it held what the page needs (files made in
- * memory, weights for GLSL, the range of simulated volumes) and the facts about a basis. */
+/* supine.wasm has at most 165 kB, and at most 67 kB if compressed: 51 before it held what the page needs (files made in
+ * memory, weights for GLSL, the range of simulated volumes) and the facts about a basis, and 56 before it held the random
+ * field of the expected error: covariances, registrations and samples. */
 const wasm = readFileSync(join(packed, 'supine.wasm'));
 const small = brotliCompressSync(wasm).length;
 console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
-assert.ok(wasm.length <= 150000 && small <= 56000);
+assert.ok(wasm.length <= 165000 && small <= 67000);
 
 /* A basis is opened from a path, an address, a Blob, a Response, or a promise. Other values are refused with what it
  * takes; a file that cannot be read is named. */
@@ -284,6 +285,42 @@ assert.match(
   execFileSync(process.execPath, ['lungs.mjs', demo, 'prone:rest+500'], { cwd: folder, encoding: 'utf8' }),
   /vertices; the first is at .*\nleft lung: \d+ mL\nright lung: \d+ mL\n$/,
 );
+
+/* The field of the expected error: the covariance of points, what a registration leaves, and samples, which are those
+ * of the command. They need memory that is reserved as the basis is opened. */
+assert.throws(() => lungs.sample(0), { status: 'argument', message: /doubt: true/ });
+const doubted = await open(bytes, { doubt: true });
+doubted.pose('prone:rest');
+const stated = doubted.expectedError().slice();
+const last = doubted.vertexCount - 1;
+const { mean, covariance } = doubted.covariance([0, last]);
+doubted.deform();
+assert.ok(Math.abs(mean[3] - doubted.positions[3 * last]) < 1e-3);
+const trace = covariance[0] + covariance[7] + covariance[14];
+assert.ok(trace > 0.999 * stated[0] ** 2 && trace < 1.34 * stated[0] ** 2);
+assert.equal(covariance[3], covariance[18]);
+const anotherDay = doubted.covariance([0], { anotherDay: true }).covariance;
+assert.ok(Math.abs(anotherDay[0] - covariance[0] - (4 / 9) * 6.2 ** 2) < 1e-9);
+const fiducials = [0, 1, 2, 3, 4, 5].map((i) => Math.floor((i * last) / 5));
+const { rotation, translation, error: left } = doubted.registration(fiducials);
+const apart = (moved) => fiducials.reduce((sum, f) => {
+  const x = Array.from(doubted.positions.subarray(3 * f, 3 * f + 3));
+  const [r, t] = moved ? [rotation, translation] : [[1, 0, 0, 0, 1, 0, 0, 0, 1], [0, 0, 0]];
+  const y = [0, 1, 2].map((k) => r[3 * k] * x[0] + r[3 * k + 1] * x[1] + r[3 * k + 2] * x[2] + t[k]);
+  return sum + Math.hypot(...y.map((value, k) => value - doubted.vertices[3 * f + k])) ** 2;
+}, 0);
+assert.ok(apart(true) < 0.9 * apart(false) && left[0] > 0 && left[0] < 1.16 * stated[0]);
+assert.throws(() => doubted.registration([0, 1]), { status: 'argument', message: /3 to 300/ });
+const drawn = join(folder, 'drawn.safetensors');
+supine('deform', demo, '--posture', 'prone:rest', '--samples', '2', '--seed', '3', '-o', drawn);
+const file = readFileSync(drawn);
+const start = 8 + file.readUInt32LE(0);
+const at = start + JSON.parse(file.subarray(8, start)).positions.data_offsets[0] + 12 * doubted.vertexCount;
+const second = new Float32Array(Uint8Array.from(file.subarray(at, at + 12 * doubted.vertexCount)).buffer);
+doubted.registration(fiducials); // in the memory of the samples' field
+assert.ok(largestDistance(doubted.sample(1, { seed: 3 }), second) < 0.05);
+const { left: volume } = doubted.volumes;
+assert.ok(largestDistance(doubted.sample(0, { seed: 3 }), second) > 5 && volume > 0);
 
 /* In TypeScript, correct use of the package compiles, and each line of wrong use gives one error. */
 const typescript = loadCommon('typescript');

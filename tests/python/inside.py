@@ -67,9 +67,13 @@ assert abs(other[0, 0, 0, 0, 0, 0] - square[0, 0] - 4 / 9 * 6.2 ** 2) < 1e-9
 drawn = lungs.samples("supine:rest", 2, seed=3)
 assert drawn.shape == (2, n, 3) and (drawn[0] != drawn[1]).any()
 assert (drawn == lungs.samples("supine:rest", 2, seed=3)).all()
-left = lungs.registered_error("prone:rest", [0, n // 4, n // 2, n - 1])
+fiducials = [0, n // 4, n // 2, n - 1]
+turn, shift, left = lungs.registration("prone:rest", fiducials)
+placed = lungs.deform(lungs.pose("prone:rest"))[fiducials] @ turn.T + shift
+assert np.abs(turn @ turn.T - np.eye(3)).max() < 1e-6
+assert np.abs((placed - lungs.deform(lungs.pose("supine:scan"))[fiducials]).mean(0)).max() < 0.01
 assert left.shape == (n,) and (left > 0).all() and left[0] < lungs.expected_error("prone:rest")[0] * (4 / 3) ** .5
-refused(supine.ArgumentError, "2 points of the frame", lungs.registered_error, "prone", [0, 1])
+refused(supine.ArgumentError, "2 points of the frame", lungs.registration, "prone", [0, 1])
 
 # A basis of clusters has computed coefficients. In fields over gravity and volume, each lung has weights of its own.
 for name, shape in (("clusters", (5,)), ("simulated", (2, 2))):

@@ -447,18 +447,20 @@ class Basis:
             _c.doubt_mend_sample(mend, made[index].ctypes.data)
         return made
 
-    def registered_error(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
-                         another_day: bool = False) -> Floats:
-        """Compute the expected error [N] of the vertices, mm (3-D RMS), that remains after a rigid registration at
-        fiducials, vertices of this basis: the target registration error. Give at least three, spread around the
-        targets."""
+    def registration(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
+                     another_day: bool = False) -> tuple[Doubles, Doubles, Floats]:
+        """Register a state at fiducials, vertices of this basis: at least three, spread around the targets. Return the
+        rotation [3, 3] and the translation [3], mm, that move their positions x closest to those in the scan,
+        rotation @ x + translation, and the expected error [N] of the vertices that is left after it, mm (3-D RMS): the target
+        registration error. The same as `supine deform --frame POINTS`."""
         field, _space = self._doubt([state], since, another_day)
         places = (ctypes.c_size_t * len(fiducials))(*map(int, fiducials))
         space, frame = np.empty(_c.doubt_frame_space(len(fiducials))), ctypes.c_void_p()
         _c.doubt_frame_prepare(field, len(fiducials), places, space.ctypes.data, frame)
-        sigma = np.empty(self.vertex_count, _FLOAT)
+        rotation, translation, sigma = np.empty((3, 3)), np.empty(3), np.empty(self.vertex_count, _FLOAT)
+        _c.doubt_frame_motion(frame, rotation.ctypes.data, translation.ctypes.data)
         _c.doubt_frame_errors(frame, 0, self.vertex_count, sigma.ctypes.data)
-        return sigma
+        return rotation, translation, sigma
 
     def targets(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> list[Target]:
         """Compute where each named structure of a basis made by `embed` is in a state, and how far it has moved from

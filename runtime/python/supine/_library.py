@@ -380,6 +380,7 @@ doubt_mend_sample = _checked("doubt_mend_sample", c_void_p, c_void_p)
 doubt_frame_space = _declare("doubt_frame_space", c_size_t, c_size_t)
 doubt_frame_prepare = _checked("doubt_frame_prepare", c_void_p, c_size_t, POINTER(c_size_t), c_void_p,
                                POINTER(c_void_p))
+doubt_frame_motion = _declare("doubt_frame_motion", None, c_void_p, c_void_p, c_void_p)
 doubt_frame_errors = _posed("doubt_frame_errors", c_void_p, c_size_t, c_size_t, c_void_p)
 expected_another_day = _declare("expected_another_day", c_double, c_double)
 locate_space = _declare("locate_space", c_size_t, c_size_t)
