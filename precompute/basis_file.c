@@ -149,6 +149,9 @@ static void add_expected_error(entries *list, const supine_prepared *prepared) {
   add(list, "expected_error_mm", "%g", supine_patient_expected(record));
   add(list, "expected_error_from_mm", "%g", record->report.expected_from);
   add(list, "expected_error_source", "%s", prepared->fit);
+  if (record->report.expected_share > 0.0) {
+    add(list, "expected_error_share", "%.9g", record->report.expected_share);
+  }
   if (record->gain_fitted) {
     add(list, "turn_fitted", "yes");
   }
@@ -194,9 +197,8 @@ static void add_lungs(entries *list, const supine_lungs *lungs, const double sha
      * library for WebAssembly needs no cube roots. */
     double expansion[2];
     for (size_t lung = 0; lung < lungs->lung_count; ++lung) {
-      supine_lungs_hilum_mean(lungs, lung,
-                              lungs->scanned != NULL ? lungs->scanned : lungs->mesh.vertices,
-                              hilum[lung]);
+      supine_lungs_hilum_mean(
+          lungs, lung, lungs->scanned != NULL ? lungs->scanned : lungs->mesh.vertices, hilum[lung]);
       expansion[lung] = 1.0 / cbrt(share[lung]) - 1.0;
     }
     add_by_lung(list, "lung_share", lungs->lung_count, share);
@@ -284,7 +286,7 @@ static void add_all(entries *list, const supine_prepared *prepared,
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 24 };
+enum { TENSORS_MAX = 26 };
 
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
 static supine_tensor list_coefficients(const supine_computed *computed,
@@ -341,6 +343,8 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"error_harmonics", SUPINE_F64, 1, {bands}, bands > 0 ? table->harmonics : NULL},
       {"error_modes", SUPINE_F64, 1, {modes}, modes > 0 ? table->modes : NULL},
       {"error_vertices", SUPINE_F32, 1, {n}, computed->vertex_error},
+      {"error_share", SUPINE_F32, 1, {n}, computed->error_share},
+      {"landmarks", SUPINE_F32, 2, {computed->landmark_count, 4}, computed->landmarks},
       {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},
       {"normal_weights",
        SUPINE_F64,

@@ -49,7 +49,12 @@ typedef struct supine_computed {
                            surface, mL, as harmonics of the direction of gravity, to degree 2 */
   /* BY_MODEL: */
   supine_error_table table; /**< errors by number of harmonics and of modes */
-  double turned_over;       /**< share of triangles (supine_projection_turned_over) */
+  float *error_share; /**< [N] share of the error that a patient's landmarks leave at a vertex,
+                         divided by its mean at those that were held out; or NULL */
+  float
+      *landmarks; /**< [landmark_count, 4] place in the reference surface, mm, and lung; or NULL */
+  size_t landmark_count;
+  double turned_over; /**< share of triangles (supine_projection_turned_over) */
   /* BY_FIELDS: */
   supine_fit fit;
   supine_fields counted;    /**< the fields over volume, counted from the scan, or empty */

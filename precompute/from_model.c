@@ -92,6 +92,53 @@ static supine_status anchor(const supine_prepared *prepared, supine_computed *ma
   return SUPINE_OK;
 }
 
+/* Find what a patient's landmarks leave of the error at every vertex. */
+static supine_status share_errors(const supine_prepared *prepared, supine_computed *made,
+                                  supine_error *error) {
+  const supine_patient_record *record = prepared->patient;
+  const supine_lungs *lungs = &made->lungs;
+  const size_t n = lungs->mesh.vertex_count;
+  if (record == NULL || record->patient.landmark_count == 0 ||
+      !(record->report.expected_share > 0.0)) {
+    return SUPINE_OK;
+  }
+  const supine_patient *patient = &record->patient;
+  const size_t m = patient->landmark_count;
+  SUPINE_ARENA arena = {0};
+  double *offsets = supine_arena_take(&arena, 3 * n, sizeof *offsets);
+  double *shares = supine_arena_take(&arena, n, sizeof *shares);
+  int *sides = supine_arena_take(&arena, n, sizeof *sides);
+  made->error_share = supine_arena_take(&made->memory, n, sizeof *made->error_share);
+  made->landmarks = supine_arena_take(&made->memory, 4 * m, sizeof *made->landmarks);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  SUPINE_TRY(supine_arena_check(&made->memory, error, "%zu vertices", n));
+  made->landmark_count = m;
+  double centre[3];
+  for (size_t k = 0; k < 3; ++k) {
+    centre[k] = 0.5 * (patient->frame.minimum[k] + patient->frame.maximum[k]);
+  }
+  for (size_t i = 0; i < 3 * n; ++i) {
+    offsets[i] = lungs->mesh.vertices[i] - centre[i % 3];
+    sides[i / 3] = supine_patient_side_of(lungs, i / 3);
+  }
+  SUPINE_TRY(supine_patient_shares(patient, n, offsets, sides, shares, error));
+  for (size_t i = 0; i < n; ++i) {
+    made->error_share[i] = (float)(shares[i] / record->report.expected_share);
+  }
+  for (size_t i = 0; i < m; ++i) {
+    const supine_patient_landmark *landmark = &patient->landmark[i];
+    for (size_t k = 0; k < 3; ++k) {
+      made->landmarks[4 * i + k] = (float)(landmark->offset[k] + centre[k]);
+    }
+    size_t lung = 0; /* or the number of lungs, if the landmark's is not there */
+    while (lung < lungs->lung_count && lungs->side[lung] != landmark->side) {
+      ++lung;
+    }
+    made->landmarks[4 * i + 3] = (float)lung;
+  }
+  return SUPINE_OK;
+}
+
 /* Check that each lung can reach its resting volume (FRC) with gravity along the unit vector g.
  * @param volume  [lungs] resting volume minus that of the reference surface, mL */
 static supine_status check_rest(const supine_computed *made, const double g[3],
@@ -183,6 +230,7 @@ supine_status supine_precompute_from_model(const supine_prepared *prepared,
   SUPINE_TRY(compress(choice, &truth, computed, error));
   SUPINE_TRY(supine_precompute_tell_progress(choice, 3, error));
   SUPINE_TRY(anchor(prepared, computed, error));
+  SUPINE_TRY(share_errors(prepared, computed, error));
   SUPINE_TRY(supine_projection_volume_forms(&computed->compression, &computed->lungs, model->share,
                                             &computed->field.rows, &computed->forms, error));
   SUPINE_TRY(find_volumes(model->share, computed, volume, error));

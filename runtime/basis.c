@@ -535,6 +535,22 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional tensor 'error_share' of a fit of landmarks. */
+static supine_status check_error_share(const check *c, supine_basis *basis) {
+  size_t n = basis->info.vertex_count;
+  if (supine_safetensors_find(c->file, "error_share") == NULL) {
+    return SUPINE_OK;
+  }
+  REQUIRE(basis->error_share, c, "error_share", SUPINE_F32, 1, &n);
+  for (size_t i = 0; i < n; ++i) {
+    if (!(basis->error_share[i] >= 0 && basis->error_share[i] <= 1e6F)) {
+      return refuse(c, "tensor 'error_share' has %g at vertex %zu, not 0 to 1e6",
+                    (double)basis->error_share[i], i);
+    }
+  }
+  return SUPINE_OK;
+}
+
 /* Check the optional tensor 'error_vertices' of another simulator's fields. */
 static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
   size_t n = basis->info.vertex_count;
@@ -748,7 +764,7 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
       check_numbers, check_surface,   check_field,     check_modes,         check_lungs,
       check_weights, check_volume,    check_reference, check_rest,          check_range,
       check_scan,    check_simulated, check_normals,   check_rigid,         check_expected,
-      check_errors,  check_collapse,  check_names,     check_vertex_errors, identify};
+      check_errors,  check_collapse,  check_names,     check_vertex_errors, check_error_share, identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

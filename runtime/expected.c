@@ -228,6 +228,7 @@ supine_status supine_expected_prepare(const supine_basis *basis, const supine_st
     rms = fmax(rms, full); /* take a collapse as no smaller than a full breath */
   }
   m->law = own * fmin(1, rms / full);
+  m->rms = rms;
   if (supine_basis_metadata(basis, "turn_fitted") == NULL) {
     m->turn = fmax(0, SUPINE_EXPECTED_ERROR_MM * fmin(1, rms / EXPECTED_FULL_BREATH) - m->law);
   }
@@ -325,16 +326,18 @@ void supine_expected_relate(supine_expected_model *m, const double *mean) {
   }
 }
 
-/* Return the length of a displacement of a pair of poses: of all of it, or of the part that a turn
- * adds. */
+/* Return the length of a displacement of a pair of poses that counts in the error: of all of it, or
+ * of the part that a turn adds. After a fit of landmarks the error depends on how far these are,
+ * and not on how far a vertex moves.
+ * @param share  that of the vertex (supine_basis.error_share) */
 static double length_of(const supine_expected_model *m, double u[EXPECTED_POSES / 2][3],
-                        bool turned) {
+                        bool turned, double share) {
   double part[3];
   if (turned) {
     supine_subtract(u[0], u[2], part);
     return supine_length(part);
   }
-  return fmax(m->least, supine_length(u[0]));
+  return m->basis->error_share != NULL ? m->rms * share : fmax(m->least, supine_length(u[0]));
 }
 
 /* Return V_i + V_h - 2 C_ih (supine_expected_relate), mm^2, for a vertex. If u_i and u_h have the
@@ -365,15 +368,20 @@ static double relative_square(const supine_expected_model *m, double per_mm, siz
   return fmax(0, square);
 }
 
+/* Return the share of the error of a vertex after a fit of landmarks; 1 without one. */
+static double share_of(const supine_expected_model *m, size_t vertex) {
+  return m->basis->error_share != NULL ? (double)m->basis->error_share[vertex] : 1;
+}
+
 /* Return relative_square of a displacement, or of the part of it that a turn adds. */
 static double relative_part(const supine_expected_model *m, double per_mm, bool turned,
                             size_t vertex, double u[EXPECTED_POSES / 2][3]) {
   double lengths[SUPINE_LUNGS_MAX];
   for (size_t j = 0; j < m->anchor_count; ++j) {
     supine_expected_anchor anchor = m->anchor[j];
-    lengths[j] = length_of(m, anchor.u, turned);
+    lengths[j] = length_of(m, anchor.u, turned, 1);
   }
-  return relative_square(m, per_mm, vertex, length_of(m, u, turned), lengths);
+  return relative_square(m, per_mm, vertex, length_of(m, u, turned, share_of(m, vertex)), lengths);
 }
 
 double supine_expected_day_square(const supine_expected_model *m, size_t vertex) {
@@ -424,6 +432,9 @@ void supine_expected_evaluate(const supine_expected_model *m, size_t begin, size
     }
     const double beside_heart = near_heart(m->basis, vertices + 3 * (begin + i));
     supine_expected_squares(m, u, beside_heart, b->square[i]);
+    if (m->basis->error_share != NULL) {
+      b->square[i][SUPINE_EXPECTED_DISPLACEMENT] = m->law * m->rms * share_of(m, begin + i);
+    }
     if (m->anchor_count > 0) {
       relate_squares(m, begin + i, u, beside_heart, b->square[i]);
     }

@@ -77,6 +77,7 @@ typedef struct supine_expected_model {
   double law;      /**< squared error per mm of displacement, mm */
   double turn;     /**< additional squared error per mm of displacement by a turn, mm */
   double per_step; /**< standard deviation of the volume / volume added in EXPECTED_FULLER */
+  double rms;      /**< RMS displacement of the lungs, mm */
   double across;   /**< length of the change of unit gravity in the x-y plane */
   double sideways; /**< length of the change of unit gravity along x */
   /** Of each lung, in EXPECTED_AT and EXPECTED_FROM: e of the formula, 0 if it is not collapsed, and

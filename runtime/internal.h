@@ -81,19 +81,22 @@ struct supine_basis {
   double upright_gain; /**< (full volume upright - full volume supine) / reference volume */
   double scan_volume;  /**< volume in the scan minus that of the reference surface, mL */
   double scan_gravity[3];
-  double hilum[SUPINE_LUNGS_MAX][3]; /**< hilum of each lung in the scan, mm, about which a collapsed
-                                        lung has shrunk there */
-  /** [lung_count, 3, mode_count] displacement of each hilum by each mode, mm, in a file of collapsed
-   * lungs; NULL if they do not move */
+  double hilum[SUPINE_LUNGS_MAX][3]; /**< hilum of each lung in the scan, mm, about which a
+                                        collapsed lung has shrunk there */
+  /** [lung_count, 3, mode_count] displacement of each hilum by each mode, mm, in a file of
+   * collapsed lungs; NULL if they do not move */
   const double *hilum_modes;
   /** [lung_count] supine_pose.expansion in the scan; 0 for a lung that is not collapsed */
   double scan_expansion[SUPINE_LUNGS_MAX];
   /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
    * if the file has none */
   const double *volume_range;
-  /** [vertices] RMS error of the fit to another simulator's fields in runs left out, mm; NULL if the
-   * file has none */
+  /** [vertices] RMS error of the fit to another simulator's fields in runs left out, mm; NULL if
+   * the file has none */
   const float *vertex_error;
+  /** [vertices] variance that a fit's landmarks leave, divided by its mean at points that were held
+   * out; NULL if the file has none */
+  const float *error_share;
   bool allow_folds;      /**< poses are not checked by `volume_range` */
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;

@@ -209,4 +209,22 @@ typedef struct supine_kriging_target {
 void supine_kriging_predict(const supine_kriging *fit, const supine_kriging_target *target,
                             float *shift, float *variance);
 
+/** A place where the field was observed, or is asked for. */
+typedef struct supine_kriging_place {
+  double position[3]; /**< mm */
+  size_t lung;
+} supine_kriging_place;
+
+/** Factor the covariance of places that were observed, of a field with the variance 1 everywhere,
+ * the correlation of supine_kriging_default, and noise of a tenth of its variance.
+ * @param factor  [count, count] written
+ * @return false if it is not positive definite */
+bool supine_kriging_share_prepare(size_t count, const supine_kriging_place *seen, double *factor);
+
+/** Return the share of the field's variance that the observed places leave at another one, by
+ * simple kriging: 1 - k' K^-1 k, 0 to 1 (Rasmussen & Williams 2006, equation 2.26).
+ * @param scratch  [count] work space */
+double supine_kriging_share(size_t count, const supine_kriging_place *seen, const double *factor,
+                            const supine_kriging_place *at, double *scratch);
+
 #endif

@@ -8,9 +8,11 @@
 #include <supine/safetensors.h>
 
 #include "base/arena.h"
+#include "base/number.h"
 #include "base/parallel.h"
 #include "base/remedy.h"
 #include "base/vec3.h"
+#include "runtime/kriging.h"
 #include "runtime/rigid.h"
 
 #include "precompute/inside/anatomy.h"
@@ -40,6 +42,7 @@ typedef struct embedding {
   unsigned char *anatomy; /* [parts] the tensor anatomy */
   double *squares;        /* [lungs, 3, modes, modes] the tensor lungs_squares */
   double *hilum;          /* [lungs, 3, modes] the tensor lungs_hilum */
+  float *error_share;     /* [points] the tensor error_share; NULL without a fit of landmarks */
 } embedding;
 
 static void find_places(void *context, size_t begin, size_t end, size_t thread) {
@@ -482,6 +485,66 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
   return supine_safetensors_write(path, tensors, tensor_count, metadata, count, error);
 }
 
+typedef struct sharing {
+  const embedding *e;
+  size_t count;                     /* number of landmarks */
+  const supine_kriging_place *seen; /* [count] */
+  const double *factor;             /* [count, count] */
+  double *scratch;                  /* [threads, count] */
+  double held_out;                  /* mean share at landmarks that were held out */
+} sharing;
+
+static void share_range(void *context, size_t begin, size_t end, size_t thread) {
+  const sharing *s = context;
+  for (size_t i = begin; i < end; ++i) {
+    supine_kriging_place at = {.lung = s->e->group[i]};
+    for (size_t k = 0; k < 3; ++k) {
+      at.position[k] = (double)s->e->vertices[3 * i + k];
+    }
+    const double share =
+        supine_kriging_share(s->count, s->seen, s->factor, &at, s->scratch + thread * s->count);
+    s->e->error_share[i] = (float)(share / s->held_out);
+  }
+}
+
+/* Find what the landmarks of a fit, if the lungs' basis has any, leave of the error of each point.
+ */
+static supine_status share_errors(embedding *e, supine_error *error) {
+  enum { GRAIN = 64 };
+  const supine_tensor *landmarks = supine_basis_tensor(e->shells->basis, "landmarks");
+  const char *text = supine_basis_metadata(e->shells->basis, "expected_error_share");
+  if (landmarks == NULL) {
+    e->error_share = NULL;
+    return SUPINE_OK;
+  }
+  sharing s = {.e = e,
+               .count = landmarks->shape[0],
+               .held_out = text == NULL ? 0.0 : supine_number_parse(text, NULL)};
+  const bool valid = landmarks->dtype == SUPINE_F32 && landmarks->rank == 2 &&
+                     landmarks->shape[1] == 4 && s.held_out > 0.0;
+  SUPINE_ARENA arena = {0};
+  supine_kriging_place *seen = supine_arena_take(&arena, s.count, sizeof *seen);
+  double *factor = supine_arena_take(&arena, s.count, s.count * sizeof *factor);
+  s.scratch = supine_arena_take(&arena, supine_thread_count(), s.count * sizeof *s.scratch);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", s.count));
+  const float *number = landmarks->data;
+  if (valid) {
+    for (size_t i = 0; i < s.count; ++i, number += 4) {
+      seen[i] = (supine_kriging_place){
+          .position = {(double)number[0], (double)number[1], (double)number[2]},
+          .lung = (size_t)fmaxf(0.0F, fminf(number[3], SUPINE_LUNGS_MAX))};
+    }
+  }
+  const bool usable = valid && supine_kriging_share_prepare(s.count, seen, factor);
+  SUPINE_REFUSE_IF(!usable, error, SUPINE_ERROR_FORMAT,
+                   "the landmarks in the basis are malformed: make it again with 'supine "
+                   "precompute'");
+  s.seen = seen;
+  s.factor = factor;
+  supine_parallel_for(e->content->count, GRAIN, 0, share_range, &s);
+  return SUPINE_OK;
+}
+
 /* Tensors of the lungs' basis that the file takes over. */
 static const char *const shared[] = {
     "modes",        "volume_linear", "volume_quadratic", "volume_cubic",     "resting_volume",
@@ -504,7 +567,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     const double x = (double)info->bounds[i];
     *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
   }
-  supine_tensor tensors[22] = {
+  supine_tensor tensors[23] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
       {"lung", SUPINE_U8, 1, {n}, e->group},
@@ -537,6 +600,9 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     tensors[count++] = (supine_tensor){
         "lungs_hilum", SUPINE_F64, 3, {e->shells->count, 3, e->columns / 3}, e->hilum};
   }
+  if (e->error_share != NULL) {
+    tensors[count++] = (supine_tensor){"error_share", SUPINE_F32, 1, {n}, e->error_share};
+  }
   if (e->rigid_count > 0) {
     tensors[count++] = (supine_tensor){"rigid", SUPINE_U32, 2, {e->rigid_count, 2}, e->rigid};
   }
@@ -566,6 +632,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       .depth = supine_arena_take(&arena, n, sizeof *e.depth),
       .part = supine_arena_take(&arena, n, sizeof *e.part),
       .group = supine_arena_take(&arena, n, 1),
+      .error_share = supine_arena_take(&arena, n, sizeof *e.error_share),
       .triangles = supine_arena_take(&arena, 3 * content->triangle_count, sizeof *e.triangles),
       .rigid = supine_arena_take(&arena, 2 * content->part_count, sizeof *e.rigid),
       .anatomy = supine_arena_take(&arena, content->part_count, 1),
@@ -585,5 +652,6 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
   for (size_t i = 0; i < e.rigid_count; ++i) {
     rigid_to_full(&e, e.rigid[2 * i], e.rigid[2 * i + 1]);
   }
+  SUPINE_TRY(share_errors(&e, error));
   return write_content(&e, path, error);
 }

@@ -35,8 +35,9 @@ static const double full_breath = 18.0; /* largest report->expected_from, mm (su
 typedef struct squares {
   double residual[SCORES]; /* [predictor] weighted sum of squared residuals, mm^2 */
   double weight;
-  double back; /* sum of the squared errors of landmarks that are moved back, mm^2 */
-  double path; /* sum of their predicted displacements, mm */
+  double back;  /* sum of the squared errors of landmarks that are moved back, mm^2 */
+  double path;  /* sum of their predicted displacements, mm */
+  double share; /* sum of the shares of the variance that the other landmarks leave there */
 } squares;
 
 typedef struct study {
@@ -44,8 +45,9 @@ typedef struct study {
   const supine_patient_frame *frame;
   const supine_patient_row *rows;
   size_t row_count, triples;
-  double *ratio; /* [SEEDS, triples] squared error of a held-out landmark that is moved back / its
-                    displacement, mm */
+  double *ratio; /* [SEEDS, triples] squared error of a held-out landmark that is moved back / what
+                    it is in proportion to: the share that is left there (supine_patient_shares) or,
+                    without a correction, its displacement, mm */
   size_t *fold;  /* [SEEDS, row_count] fold of each measurement */
   squares held_out[ITEMS]; /* [SEEDS, FOLDS] squared errors of held-out measurements, summed */
   supine_status failed[ITEMS];
@@ -147,11 +149,11 @@ static double corrected_residual(const supine_patient *patient, const supine_pat
 
 /* Fit each predictor of supine_patient_score (no displacement, translation, affine map,
  * displacement law, corrected law) to krige->rows. Add the squared errors at `rows` to the sums of
- * each. If there are landmarks, use only these, and write the ratio of each if not NULL.
+ * each. If there are landmarks, use only these.
  * @param patient  the law and the correction of `krige` */
 static void add_residuals(const study *s, const supine_patient_row *rows, size_t count,
                           const supine_patient_krige *krige, const supine_patient *patient,
-                          squares *sums, double *ratio) {
+                          squares *sums) {
   double map[2][AFFINE];
   affine_fit(krige->rows, krige->count, true, map[0]);
   affine_fit(krige->rows, krige->count, false, map[1]);
@@ -169,14 +171,38 @@ static void add_residuals(const study *s, const supine_patient_row *rows, size_t
       sums->residual[k] += row->weight * residual[k] * residual[k];
     }
     sums->weight += row->weight;
-    if (ratio != NULL && row->axis[0] == 1.0 && row->landmark > 0) { /* x, y and z follow */
+  }
+}
+
+/* Move the landmarks among measurements back to the fuller scan. Add their squared errors, their
+ * displacements and the shares that the fitted landmarks leave there to the sums of each, and write
+ * the ratio of each. */
+static supine_status add_landmarks(const supine_patient_row *rows, size_t count,
+                                   const supine_patient *patient, squares *sums, double *ratio) {
+  const bool corrected = patient->landmark_count > 0;
+  SUPINE_ARENA arena = {0};
+  double *offsets = supine_arena_take(&arena, count, 3 * sizeof *offsets);
+  double *shares = supine_arena_take(&arena, count, sizeof *shares);
+  int *sides = supine_arena_take(&arena, count, sizeof *sides);
+  if (arena.failed) {
+    return SUPINE_ERROR_MEMORY;
+  }
+  for (size_t i = 0; i < count; ++i) {
+    memcpy(offsets + 3 * i, rows[i].place.offset, 3 * sizeof *offsets);
+    sides[i] = rows[i].place.side;
+  }
+  SUPINE_TRY(supine_patient_shares(patient, count, offsets, sides, shares, NULL));
+  for (size_t i = 0; i < count; ++i) {
+    if (rows[i].landmark > 0 && rows[i].axis[0] == 1.0) { /* x, y and z follow each other */
       double size;
-      const double square = move_back(patient, row, &size);
+      const double square = move_back(patient, &rows[i], &size);
       sums->back += square;
       sums->path += size;
-      ratio[row->landmark - 1] = square / size;
+      sums->share += shares[i];
+      ratio[rows[i].landmark - 1] = square / (corrected ? shares[i] : size);
     }
   }
+  return SUPINE_OK;
 }
 
 static supine_status hold_out(const study *s, const size_t *fold, size_t which, squares *sums,
@@ -204,7 +230,8 @@ static supine_status hold_out(const study *s, const size_t *fold, size_t which, 
     SUPINE_TRY(supine_patient_krige_fit(&s->options, rows, fitted_count, &krige, NULL));
     patient->frame = *s->frame;
     supine_patient_krige_copy_law(&krige, patient);
-    add_residuals(s, rows + fitted_count, n - fitted_count, &krige, patient, sums, ratio);
+    add_residuals(s, rows + fitted_count, n - fitted_count, &krige, patient, sums);
+    SUPINE_TRY(add_landmarks(rows + fitted_count, n - fitted_count, patient, sums, ratio));
   }
   return SUPINE_OK;
 }
@@ -232,6 +259,7 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
     held_out->weight += item_sums->weight;
     held_out->back += item_sums->back;
     held_out->path += item_sums->path;
+    held_out->share += item_sums->share;
   }
   return SUPINE_OK;
 }
@@ -240,7 +268,8 @@ static supine_status hold_all_out(study *s, squares *held_out, supine_error *err
  * that of other patients; the RMS displacement to which it applies; the expected error; and the
  * share of the held-out landmarks that err by less than 1.8 times as much. With c, the sum of the
  * squared errors that are expected of the held-out landmarks is the sum of those that they have,
- * if they are moved back from the emptier to the fuller scan. */
+ * if they are moved back from the emptier to the fuller scan. After a correction by landmarks, an
+ * error is in proportion to the share that these leave there, not to the displacement. */
 static void set_expected(const study *s, const squares *held_out, const supine_patient *patient,
                          supine_patient_fit_report *report) {
   const size_t count = SEEDS * s->triples;
@@ -258,23 +287,31 @@ static void set_expected(const study *s, const squares *held_out, const supine_p
       points += 1.0;
     }
   }
+  const bool corrected = patient->landmark_count > 0;
+  const double rms = sqrt(square / points);
   report->expected_constant = constant_of_surfaces;
   if (count > 0) {
-    const double own = held_out->back / held_out->path;
+    const double path = corrected ? rms * (double)count : held_out->path;
+    const double own = held_out->back / path;
     report->expected_constant = (prior_points * constant_of_landmarks + (double)s->triples * own) /
                                 (prior_points + (double)s->triples);
     report->stretch =
         sqrt(held_out->back / (double)count) / report->held_out[SUPINE_PATIENT_SCORE_CORRECTED];
   }
+  double per_ratio = report->expected_constant; /* expected square divided by s->ratio's divisor */
+  if (count > 0 && corrected) {
+    report->expected_share = held_out->share / (double)count;
+    per_ratio *= rms / report->expected_share;
+  }
   for (size_t i = 0; i < count; ++i) {
-    within += s->ratio[i] <= bound * bound * report->expected_constant ? 1.0 : 0.0;
+    within += s->ratio[i] <= bound * bound * per_ratio ? 1.0 : 0.0;
   }
   report->has_band = count > 0;
   if (report->has_band) {
     report->band = 100.0 * within / (double)count;
   }
-  report->expected_from = fmin(full_breath, sqrt(square / points));
-  report->expected_point = sqrt(report->expected_constant * mean / points);
+  report->expected_from = fmin(full_breath, rms);
+  report->expected_point = sqrt(report->expected_constant * (corrected ? rms : mean / points));
 }
 
 static supine_patient_score baseline_of(const study *s) {
@@ -299,7 +336,7 @@ static supine_status run(study *s, supine_patient *patient, supine_patient_fit_r
   SUPINE_FREED_BY(supine_patient_krige_free) supine_patient_krige krige = {0};
   SUPINE_TRY(supine_patient_krige_fit(&s->options, s->rows, s->row_count, &krige, error));
   supine_patient_krige_copy_law(&krige, patient);
-  add_residuals(s, s->rows, s->row_count, &krige, patient, &fitted, NULL);
+  add_residuals(s, s->rows, s->row_count, &krige, patient, &fitted);
   s->options.sill = krige.sill;
   s->options.uncorrected = krige.sill == 0.0;
   supine_patient_krige_errors(&krige, report->error);

@@ -364,6 +364,7 @@ void supine_patient_krige_errors(const supine_patient_krige *krige,
 void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_patient *patient) {
   patient->power = krige->law;
   patient->centre_count = 0;
+  patient->landmark_count = 0;
   if (krige->sill <= 0.0) {
     return;
   }
@@ -378,6 +379,11 @@ void supine_patient_krige_copy_law(const supine_patient_krige *krige, supine_pat
         memcmp(last[-1].offset, centre.offset, sizeof centre.offset) != 0) {
       ++patient->centre_count;
       *last++ = centre;
+      if (krige->rows[i].landmark > 0) {
+        supine_patient_landmark *landmark = &patient->landmark[patient->landmark_count++];
+        *landmark = (supine_patient_landmark){.side = centre.side};
+        memcpy(landmark->offset, centre.offset, sizeof landmark->offset);
+      }
     }
     for (size_t a = 0; a < 3; ++a) {
       last[-1].weight[a] += krige->scaled_sill * krige->kernel_weight[i] * krige->rows[i].axis[a];

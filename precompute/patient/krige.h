@@ -141,6 +141,9 @@ typedef struct supine_patient_fit_report {
   double stretch;
   double expected_point;    /**< expected error of a point predicted in the fuller scan, mm */
   double expected_constant; /**< expected squared error there, mm^2, per mm of displacement */
+  /** Mean share of the error's variance that the other landmarks left at held-out ones, 0 without
+   * a correction by landmarks (supine_patient_shares). */
+  double expected_share;
   double expected_from; /**< RMS displacement, mm, below which this constant falls in proportion */
   bool has_errors;      /**< whether any of c1 to c9 was fitted, and therefore has an `error` */
   double error[SUPINE_PATIENT_CONSTANTS]; /**< standard errors of c1 to c9 (patient.h) */

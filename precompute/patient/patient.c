@@ -5,6 +5,7 @@
 
 #include "precompute/patient/patient.h"
 
+#include "base/arena.h"
 #include "base/clones.h"
 #include "base/vec3.h"
 #include "precompute/physics/model.h"
@@ -198,4 +199,29 @@ supine_force_law supine_patient_force(const supine_patient_power *power, double 
   law.box[2] = slope[2] + gain * gravity[2];
   law.base = 1.0 - 0.5 * gain - 0.5 * (law.box[0] + law.box[1] + law.box[2]);
   return law;
+}
+
+supine_status supine_patient_shares(const supine_patient *patient, size_t count,
+                                    const double *offsets, const int *sides, double *shares,
+                                    supine_error *error) {
+  const size_t n = patient->landmark_count;
+  SUPINE_ARENA arena = {0};
+  supine_kriging_place *seen = supine_arena_take(&arena, n, sizeof *seen);
+  double *factor = supine_arena_take(&arena, n * n, sizeof *factor);
+  double *scratch = supine_arena_take(&arena, n, sizeof *scratch);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", n));
+  for (size_t i = 0; i < n; ++i) {
+    const supine_patient_landmark *landmark = &patient->landmark[i];
+    memcpy(seen[i].position, landmark->offset, sizeof seen[i].position);
+    seen[i].lung = landmark->side > 0 ? 0 : 1;
+  }
+  const bool positive = supine_kriging_share_prepare(n, seen, factor);
+  SUPINE_REFUSE_IF(!positive, error, SUPINE_ERROR_NUMERICAL,
+                   "the landmarks have no covariance: give finite positions");
+  for (size_t i = 0; i < count; ++i) {
+    supine_kriging_place at = {.lung = sides[i] > 0 ? 0 : 1};
+    memcpy(at.position, offsets + 3 * i, sizeof at.position);
+    shares[i] = supine_kriging_share(n, seen, factor, &at, scratch);
+  }
+  return SUPINE_OK;
 }

@@ -69,13 +69,30 @@ typedef struct supine_patient_centre {
   double weight[3]; /**< [axis] factor of the covariance, 1/mm */
 } supine_patient_centre;
 
+/** A landmark of the fit. */
+typedef struct supine_patient_landmark {
+  double offset[3]; /**< position relative to the centre of the lungs' bounding box, mm */
+  int side;         /**< +1 left lung, -1 right lung */
+} supine_patient_landmark;
+
 typedef struct supine_patient {
   supine_patient_law law;
   supine_patient_frame frame;
   supine_patient_power power;
   size_t centre_count; /**< number of points `centre`; 0 if there is no kriging correction */
   supine_patient_centre centre[SUPINE_PATIENT_CENTRES_MAX];
+  size_t landmark_count; /**< 0 if there is no kriging correction, or it is one of surfaces alone */
+  supine_patient_landmark landmark[SUPINE_PATIENT_CENTRES_MAX];
 } supine_patient;
+
+/** Compute the share of the variance of the error that a patient's landmarks leave at places
+ * (supine_kriging_share): 1 far from all of them.
+ * @param offsets  [count, 3] relative to the centre of the lungs' bounding box, mm
+ * @param sides    [count] +1 left lung, -1 right lung
+ * @param shares   [count] written */
+supine_status supine_patient_shares(const supine_patient *patient, size_t count,
+                                    const double *offsets, const int *sides, double *shares,
+                                    supine_error *error);
 
 /** A point of a lung, with the variables of the displacement law at this point. */
 typedef struct supine_patient_place {

@@ -177,6 +177,11 @@ static void check_record(const supine_patient_record *record, invalid *found) {
       fail(found, "centres", "displacement_mm");
     }
   }
+  for (size_t i = 0; i < record->patient.landmark_count; ++i) {
+    if (record->patient.landmark[i].side == 0) {
+      fail(found, "landmarks", "lung");
+    }
+  }
   check_box("emptier_frame", record->emptier[0], record->emptier[1], found);
   for (size_t k = 0; k < record->stiffness.count; ++k) {
     const supine_patient_region *region = &record->stiffness.region[k];

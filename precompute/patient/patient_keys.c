@@ -37,6 +37,13 @@ static const supine_patient_key centre_list[] = {
 static const supine_patient_keys centre_keys = KEYS(centre_list);
 #undef RECORD
 
+#define RECORD supine_patient_landmark
+static const supine_patient_key landmark_list[] = {
+    {"", "lung", WORD(LUNGS, side, lungs_words)},
+    {"", "offset_mm", NUMBERS(3, offset)}};
+static const supine_patient_keys landmark_keys = KEYS(landmark_list);
+#undef RECORD
+
 #define RECORD supine_patient_further
 static const supine_patient_key further_list[] = {
     {"", "state", STATE(state)},
@@ -77,6 +84,9 @@ static const supine_patient_key law_list[] = {
     {"", "correction", OBJECT},
     {"correction", "centres", LIST(supine_patient_centre, patient.centre, SUPINE_PATIENT_CENTRES_MAX,
                                    patient.centre_count, centre_keys)},
+    {"correction", "landmarks", LIST(supine_patient_landmark, patient.landmark,
+                                     SUPINE_PATIENT_CENTRES_MAX, patient.landmark_count,
+                                     landmark_keys), .presence = SUPINE_PATIENT_IF_COUNTED},
     {"", "further_states", LIST(supine_patient_further, further, SUPINE_PATIENT_OTHERS_MAX,
                                 further_count, further_keys), WRITTEN}};
 const supine_patient_keys supine_patient_law_keys = KEYS(law_list);
@@ -100,6 +110,7 @@ static const supine_patient_key fit_list[] = {
     {"", "expected_rms_mm", NUMBER(report.expected_point)},
     {"", "expected_constant_mm", NUMBER(report.expected_constant)},
     {"", "expected_from_mm", NUMBER(report.expected_from)},
+    {"", "expected_share_held_out", NUMBER(report.expected_share), IF_POSITIVE},
     {"", "band_95_percent_holds", NUMBER(report.band), IF_FLAG(report.has_band)},
     {"", "emptier_frame", OBJECT},
     {"emptier_frame", "minimum_mm", NUMBERS(3, emptier[0])},

@@ -144,6 +144,7 @@ static const struct {
               {NULL, "expected_error_terms", "terms of the expected error"},
               {NULL, "expected_largest_mm", "expected error, largest, mm"},
               {NULL, "expected_rms_mm", "expected error, RMS, mm"},
+              {NULL, "expected_share_held_out", "variance left at held-out points"},
               {NULL, "facts", "assumed and given"},
               {NULL, "fitted_rms_mm", "residual at the fitted points, RMS, mm"},
               {NULL, "fitted_without_and_with_mm", "fitted: uniform, by region, mm"},

@@ -383,6 +383,9 @@ static void add_volumes(const fixture *f, tensors *t) {
   if (f->full != NULL) {
     add_tensor(t, (supine_tensor){"full_volume", SUPINE_F64, 2, {g, 9}, f->full});
   }
+  if (f->error_share != NULL) {
+    add_tensor(t, (supine_tensor){"error_share", SUPINE_F32, 1, {f->vertices}, f->error_share});
+  }
   if (f->vertex_error != NULL) {
     add_tensor(t, (supine_tensor){"error_vertices", SUPINE_F32, 1, {f->vertices}, f->vertex_error});
   }

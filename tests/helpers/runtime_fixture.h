@@ -42,9 +42,10 @@ typedef struct fixture {
   /* Volumes of another simulator, mL above the reference surface, if `orders` is above 1 */
   double range[17][2], limits[17][2][9], shares[17][9][2];
   double total[2];
-  const double *full; /* [lungs, 9] volume at full inflation, or NULL */
+  const double *full;        /* [lungs, 9] volume at full inflation, or NULL */
   const float *vertex_error; /* [vertices] mm (tensor 'error_vertices'), or NULL */
-  const double *held; /* [27, lungs, 2] volumes that the lungs can hold, mL, or NULL */
+  const float *error_share;  /* [vertices] (tensor 'error_share'), or NULL */
+  const double *held;        /* [27, lungs, 2] volumes that the lungs can hold, mL, or NULL */
 } fixture;
 
 /* Return zeroed memory. Abort if the allocation fails. */

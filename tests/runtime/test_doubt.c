@@ -96,6 +96,45 @@ TEST(test_covariance_known_volume_equals_kernel_of_expected_error) {
   }
 }
 
+/* After a fit of landmarks, the term of the displacement is the same everywhere but for the share
+ * that these leave, with the mean square that the displacement's RMS gives. */
+TEST(test_expected_error_after_landmarks_follows_their_shares) {
+  world *w = *state;
+  float share[VERTICES];
+  float plain[VERTICES];
+  float sigma[VERTICES];
+  supine_basis *shared = NULL;
+  supine_error error = {0};
+  size_t size = 0;
+  const supine_state *given = &w->states[STATES - 1]; /* the displacement is the only term */
+  for (size_t i = 0; i < VERTICES; ++i) {
+    share[i] = 0.5F + (float)(i * 7 % VERTICES) / VERTICES;
+  }
+  w->fixture->error_share = share;
+  unsigned char *bytes = fixture_bytes(w->fixture, &size);
+  assert_int_equal(supine_basis_open_memory(bytes, size, &shared, &error), SUPINE_OK);
+  assert_int_equal(supine_expected_error(shared, given, NULL, sigma, NULL), SUPINE_OK);
+  assert_int_equal(supine_expected_error(w->basis, given, NULL, plain, NULL), SUPINE_OK);
+  double fourth = 0; /* sigma^2 is in proportion to the displacement without shares */
+  double second = 0;
+  for (size_t i = 0; i < VERTICES; ++i) {
+    fourth += pow((double)plain[i], 4) / VERTICES;
+    second += pow((double)sigma[i], 2) / (double)share[i] / VERTICES;
+  }
+  assert_close(second, sqrt(fourth), 1e-3 * second);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    assert_close(pow((double)sigma[i], 2), second * (double)share[i], 1e-4 * second);
+  }
+  supine_basis_close(shared);
+  free(bytes);
+  share[3] = -1;
+  bytes = fixture_bytes(w->fixture, &size);
+  w->fixture->error_share = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &shared, &error), SUPINE_ERROR_FORMAT);
+  assert_says(error.message, "tensor 'error_share' has -1 at vertex 3");
+  free(bytes);
+}
+
 /* The covariance of points in four states is symmetric and positive semidefinite, and its diagonal
  * lies between the square of the expected error and 4/3 of it. */
 TEST(test_covariance_several_states_positive) {

@@ -311,6 +311,41 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
   free(space);
 }
 
+/* Of one place with noise n, 1 / (1 + n) of the variance is known there, r^2 / (1 + n) where the
+ * correlation is r, and nothing far away or, with r / 3, in the other lung. */
+TEST(test_kriging_share_one_place_equals_formula) {
+  const supine_kriging_place seen = {.position = {10, -20, 30}};
+  double factor = 0;
+  double scratch = 0;
+  assert_true(supine_kriging_share_prepare(1, &seen, &factor));
+  for (size_t lung = 0; lung < 2; ++lung) {
+    for (int far = 0; far < 400; far += 45) {
+      const supine_kriging_place at = {.position = {10, -20 + far, 30}, .lung = lung};
+      const double a = sqrt(3.0) * far / 90;
+      const double r = (1 + a) * exp(-a) / (lung == 0 ? 1 : 3);
+      assert_close(supine_kriging_share(1, &seen, &factor, &at, &scratch), 1 - r * r / 1.1, 1e-12);
+    }
+  }
+}
+
+/* A second place elsewhere lowers every share, and two at one place count as one with half the
+ * noise. */
+TEST(test_kriging_share_more_places_leave_less) {
+  const supine_kriging_place seen[2] = {{.position = {0, 0, 0}}, {.position = {40, 0, 0}}};
+  const supine_kriging_place twice[2] = {seen[0], seen[0]};
+  const supine_kriging_place at = {.position = {15, 20, 0}};
+  double factor[4] = {0};
+  double scratch[2];
+  assert_true(supine_kriging_share_prepare(1, seen, factor));
+  const double one = supine_kriging_share(1, seen, factor, &at, scratch);
+  assert_true(supine_kriging_share_prepare(2, seen, factor));
+  const double two = supine_kriging_share(2, seen, factor, &at, scratch);
+  assert_true(two > 0 && two < 0.9 * one && one < 1);
+  assert_true(supine_kriging_share_prepare(2, twice, factor));
+  const double same = supine_kriging_share(2, twice, factor, &seen[0], scratch);
+  assert_close(same, 0.05 / 1.05, 1e-12);
+}
+
 TEST(test_kriging_rotation_of_collinear_points_refused) {
   uint64_t seed = 9;
   supine_kriging_point points[4];

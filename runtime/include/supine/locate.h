@@ -12,6 +12,11 @@
  *               + (3 mm |Dg_x|)^2                        sliding
  *               + |e (x_i - h)|^2                        collapse
  *
+ * After a fit of landmarks, RMS of |u| q_i replaces |u_i| in the first term: q_i is the share of
+ * the variance that kriging of a constant field leaves at the vertex, given the landmarks, divided
+ * by its mean at landmarks that were held out (tensor "error_share", <supine/doubt.h> has the
+ * kernel; the landmarks have a tenth of its variance as noise).
+ *
  *     u_i     displacement of the vertex from a state whose positions are exact, mm
  *     c       4.5 mm (95 % interval 3.7 to 5.7), measured on full breaths of 15 people in one
  *             posture; or the constant of a patient's fit, metadata "expected_error_mm"

@@ -451,8 +451,8 @@ class Basis:
                      another_day: bool = False) -> tuple[Doubles, Doubles, Floats]:
         """Register a state at fiducials, vertices of this basis: at least three, spread around the targets. Return the
         rotation [3, 3] and the translation [3], mm, that move their positions x closest to those in the scan,
-        rotation @ x + translation, and the expected error [N] of the vertices that is left after it, mm (3-D RMS): the target
-        registration error. The same as `supine deform --frame POINTS`."""
+        rotation @ x + translation, and the expected error [N] of the vertices that is left after it, mm (3-D RMS): the
+        target registration error. The same as `supine deform --frame POINTS`."""
         field, _space = self._doubt([state], since, another_day)
         places = (ctypes.c_size_t * len(fiducials))(*map(int, fiducials))
         space, frame = np.empty(_c.doubt_frame_space(len(fiducials))), ctypes.c_void_p()
