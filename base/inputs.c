@@ -100,6 +100,11 @@ static const supine_input inputs[] = {
     .against = TEXT("what its message says of it"), .measured = TEXT("poses marked as invalid"),
     .told = 0, .refused = NAN, .evidence = TEXT("PLUS: TransformValid, TransformStatus"),
     .interfaces = COMMAND},
+  [SUPINE_INPUT_FRAME_LINE] = {
+    .name = "frame-line", .group = TEXT("Points"), .input = TEXT("points at which the lungs are registered"),
+    .against = TEXT("the line that fits them best"), .measured = TEXT("RMS distance from the line, mm"), .below = true,
+    .told = NAN, .refused = 10, .evidence = TEXT("assumed: the turn about the line is open, and two points are on one"),
+    .interfaces = ALL},
   [SUPINE_INPUT_HEIGHT_LEAST] = {
     .name = TEXT("height-least"), .group = TEXT("Patient"), .input = TEXT("the patient's height"),
     .against = TEXT("the adults of the equations"), .measured = TEXT("height / least of these adults"),

@@ -9,15 +9,14 @@
 #include <math.h>
 #include <string.h>
 
+#include <supine/inputs.h>
+
 #include "base/vec3.h"
 #include "runtime/doubt.h"
 #include "runtime/internal.h"
 #include "runtime/rigid.h"
 
 enum { PARAMETERS = 6 };
-
-/* Smallest RMS distance of the fiducials from the line that fits them best, mm (assumed). */
-static const double from_line_least = 10;
 
 typedef struct fiducial {
   supine_doubt_features features;
@@ -162,11 +161,11 @@ supine_status supine_doubt_frame_prepare(const supine_doubt *doubt, size_t count
     }
   }
   const double from_line = sqrt(fmax(0, set_weights(f)) / (double)count);
-  if (!(from_line >= from_line_least)) {
+  if (supine_input_judge(SUPINE_INPUT_FRAME_LINE, from_line) == SUPINE_INPUT_REFUSED) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                             "the points of the frame lie %.1f mm (RMS) from one line, and the turn "
                             "about it is open: give points at least %.0f mm from it",
-                            from_line, from_line_least);
+                            from_line, supine_input_get(SUPINE_INPUT_FRAME_LINE)->refused);
   }
   sum_errors(f);
   find_motion(f);

@@ -38,6 +38,21 @@ def made(path, **options):
             "Python": lambda: python(lambda: supine.precompute(path, **options))}
 
 
+def registered(*vertices):
+    """Register the lungs at vertices."""
+    def by_command():
+        places = lungs.deform(lungs.pose("supine:scan"))[list(vertices)]
+        with open("frame.csv", "w", encoding="utf-8") as file:
+            file.write("name,x,y,z\n" + "".join(f"p{i},{x:.6f},{y:.6f},{z:.6f}\n"
+                                                for i, (x, y, z) in enumerate(places)))
+        return command("deform", "lungs.safetensors", "--posture", "prone:rest", "--frame", "frame.csv", "-o",
+                       "out.ply")
+
+    by_python = lambda: python(lambda: lungs.registration("prone:rest", vertices))
+    return {"command": by_command, "C": by_python, "Python": by_python,
+            "JavaScript": lambda: javascript("prone:rest", "lungs.safetensors", *vertices)}
+
+
 def points(z):
     with open("points.csv", "w", encoding="utf-8") as file:
         file.write(f"name,x,y,z\nin,-80,-120,-90\nother,-80,-120,{z}\n")
@@ -250,6 +265,7 @@ CASES = {
     "content-outside": (lambda: embedded(-100), lambda: embedded(solid[:, 2].max() + 20), "told"),
     "device-name": (tracked("OK"), tracked("OK", "a_name_of_21_letters_"), "refused"),
     "tracker-invalid": (tracked("OK"), tracked("INVALID"), "told"),
+    "frame-line": (lambda: registered(0, 100, 200, lungs.vertex_count - 1), lambda: registered(0, 1, 2), "refused"),
     "height-least": (made("lungs.ply", height=160, sex="female"), made("lungs.ply", height=135, sex="female"), "told"),
     "height-most": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=200, sex="male"), "told"),
     "rest-share": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=230, sex="male"), "refused"),

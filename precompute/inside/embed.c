@@ -537,8 +537,7 @@ static supine_status share_errors(embedding *e, supine_error *error) {
   }
   const bool usable = valid && supine_kriging_share_prepare(s.count, seen, factor);
   SUPINE_REFUSE_IF(!usable, error, SUPINE_ERROR_FORMAT,
-                   "the landmarks in the basis are malformed: make it again with 'supine "
-                   "precompute'");
+                   "the landmarks in the basis are malformed: make the basis again");
   s.seen = seen;
   s.factor = factor;
   supine_parallel_for(e->content->count, GRAIN, 0, share_range, &s);

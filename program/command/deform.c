@@ -63,7 +63,9 @@ static const supine_option table[] = {
      "positions [N, vertices, 3] in mm and LPS. They are drawn from the expected error, points "
      "near each other with errors alike, and every sample of a surface has the volumes of the "
      "state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % sure. "
-     "Samples of points inside the lungs have no surface, and their volumes are not exact",
+     "Samples of points inside the lungs have no surface, and their volumes are not exact. "
+     "Embedded points are in the order in which they were embedded. Equal options make equal "
+     "files",
      SUPINE_FILLS(request, samples), SUPINE_SAYS_GIVEN(request, samples_given),
      .range = {1.0, 100000.0}, .partners = "output seed posture gravity volume allow-folds"},
     {"seed", 0, "S", "number that decides the samples: another one draws other lungs",
@@ -290,12 +292,9 @@ static supine_status check_samples(const request *wanted, supine_error *error) {
 }
 
 /* Write samples of a state. */
-static supine_status draw(const supine_basis *basis, const request *wanted, const char *made_by,
-                          supine_error *error) {
-  const supine_deform_samples samples = {.path = wanted->content.path,
-                                         .made_by = made_by,
-                                         .count = wanted->samples,
-                                         .seed = wanted->seed};
+static supine_status draw(const supine_basis *basis, const request *wanted, supine_error *error) {
+  const supine_deform_samples samples = {
+      .path = wanted->content.path, .count = wanted->samples, .seed = wanted->seed};
   supine_state state = wanted->volume.state;
   supine_pose pose;
   SUPINE_TRY(supine_options_pose(basis, name, &state, &pose, error));
@@ -321,7 +320,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
     b.rows[i].content.label_source = wanted->content.label_source;
     b.rows[i].content.tissue = &b.tissue;
     if (wanted->samples_given) {
-      SUPINE_TRY(draw(b.basis, &b.rows[i], given->made_by, error));
+      SUPINE_TRY(draw(b.basis, &b.rows[i], error));
     } else {
       SUPINE_TRY(deform(b.basis, &b.rows[i], error));
     }

@@ -11,6 +11,7 @@
 #include "base/number.h"
 #include "program/command/deform_samples.h"
 #include "program/options/command.h"
+#include "program/options/inside.h"
 
 /* The field of a state. `mend` is NULL if the basis has no surface of the lungs, or no doubt. */
 typedef struct source {
@@ -20,10 +21,14 @@ typedef struct source {
   const supine_doubt_mend *mend;
   size_t seed, vertices;
   float *predicted; /* [vertices, 3] mm, from which samples deviate */
+  /* Embedded points, which a file holds in the order in which they were embedded, as CSV files do;
+   * all else is in the order of the basis, and `order` NULL. */
+  supine_options_names names;
   supine_arena arena;
 } source;
 
 static void end(source *s) {
+  supine_options_names_close(&s->names);
   supine_arena_free(&s->arena);
 }
 
@@ -60,20 +65,39 @@ supine_status supine_command_deform_sample(const supine_basis *basis, const supi
   return SUPINE_OK;
 }
 
+/* Sort vertices [vertices, 3] from the order of the basis into that of the file. */
+static void sort(const source *s, const float *xyz, float *sorted) {
+  for (size_t i = 0; i < s->vertices; ++i) {
+    const size_t from = s->names.order == NULL ? i : s->names.order[i];
+    memcpy(sorted + 3 * i, xyz + 3 * from, 3 * sizeof *sorted);
+  }
+}
+
 /* Write samples, with the triangles and names of their vertices. */
 static supine_status save(const supine_deform_samples *wanted, const source *s, const char *state,
                           const float *positions, supine_error *error) {
+  const size_t n = s->vertices;
+  SUPINE_ARENA arena = {0};
+  float *predicted = supine_arena_take(&arena, n, 3 * sizeof *predicted);
+  uint32_t *part = supine_arena_take(&arena, n, sizeof *part);
+  supine_tensor tensors[5] = {{"positions", SUPINE_F32, 3, {wanted->count, n, 3}, positions},
+                              {"predicted", SUPINE_F32, 2, {n, 3}, predicted}};
   static const char *const copied[] = {"triangles", "names", "part"};
-  supine_tensor tensors[5] = {
-      {"positions", SUPINE_F32, 3, {wanted->count, s->vertices, 3}, positions},
-      {"predicted", SUPINE_F32, 2, {s->vertices, 3}, s->predicted}};
-  size_t tensor_count = 2;
+  size_t count = 2;
   char seed[24];
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
+  sort(s, s->predicted, predicted);
   for (size_t i = 0; i < sizeof copied / sizeof *copied; ++i) {
     const supine_tensor *own = supine_basis_tensor(s->basis, copied[i]);
     if (own != NULL) {
-      tensors[tensor_count++] = *own;
+      tensors[count++] = *own;
     }
+  }
+  if (s->names.order != NULL) { /* the last tensor is then `part` */
+    for (size_t i = 0; i < n; ++i) {
+      part[i] = s->names.part[s->names.order[i]];
+    }
+    tensors[count - 1].data = part;
   }
   (void)snprintf(seed, sizeof seed, "%zu", s->seed);
   const supine_metadata metadata[] = {
@@ -83,9 +107,8 @@ static supine_status save(const supine_deform_samples *wanted, const source *s, 
       {"axes", "LPS"},
       {"state", state},
       {"seed", seed},
-      {"volume", s->mend != NULL ? "that of the state in every sample" : "not exact"},
-      {"made_by", wanted->made_by}};
-  return supine_safetensors_write(wanted->path, tensors, tensor_count, metadata,
+      {"volume", s->mend != NULL ? "that of the state in every sample" : "not exact"}};
+  return supine_safetensors_write(wanted->path, tensors, count, metadata,
                                   sizeof metadata / sizeof *metadata, error);
 }
 
@@ -96,7 +119,12 @@ supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
   char text[160];
   double square = 0.0;
   SUPINE_TRY(begin(&s, error));
+  const char *content = supine_basis_metadata(basis, "content");
+  if (content != NULL && strcmp(content, "points") == 0) {
+    SUPINE_TRY(supine_options_names_open(basis, &s.names, error));
+  }
   const size_t each = 3 * s.vertices;
+  float *xyz = supine_arena_take(&s.arena, each, sizeof *xyz);
   float *positions = supine_arena_take(&s.arena, wanted->count, each * sizeof *positions);
   SUPINE_TRY(supine_arena_check(&s.arena, error,
                                 "%zu samples of %zu vertices: draw fewer, with several seeds",
@@ -105,8 +133,8 @@ supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
   SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin("samples");
   for (size_t i = 0; i < wanted->count; ++i) {
-    float *xyz = positions + each * i;
     SUPINE_TRY(draw(&s, i, xyz, error));
+    sort(&s, xyz, positions + each * i);
     for (size_t e = 0; e < each; ++e) {
       square += pow((double)xyz[e] - (double)s.predicted[e], 2.0);
     }

@@ -7,7 +7,7 @@
 
 /* The samples to write. */
 typedef struct supine_deform_samples {
-  const char *path, *made_by; /* file, and the command line for its metadata */
+  const char *path;
   size_t count, seed;
 } supine_deform_samples;
 

@@ -91,8 +91,10 @@ const { open } = await import(process.argv[1]);
 const state = new Function(`return ${process.argv[2]}`)(); // JSON has no NaN
 let said = ['taken', ''];
 try {
-  const lungs = await open(readFileSync(process.argv[3]));
+  const [basis, fiducials] = process.argv.slice(3);
+  const lungs = await open(readFileSync(basis), { doubt: true });
   lungs.pose(state);
+  if (fiducials !== undefined) lungs.registration(JSON.parse(fiducials));
 } catch (error) {
   said = ['refused', error.message];
 }
@@ -100,12 +102,13 @@ console.log(JSON.stringify(said));
 """
 
 
-def javascript(state, basis):
-    """Open a basis and compute a pose in node; return None if it cannot run."""
+def javascript(state, basis, *fiducials):
+    """Open a basis and compute a pose in node, and register it at fiducials; return None if it cannot run."""
     node = shutil.which("node")
     if node is None or not os.path.exists(PACKAGE):
         return None
-    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps(state), basis],
+    done = subprocess.run([node, "--input-type=module", "-e", JAVASCRIPT, PACKAGE, json.dumps(state), basis,
+                           *([json.dumps(fiducials)] if fiducials else [])],
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return tuple(json.loads(done.stdout))

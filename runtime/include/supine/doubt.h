@@ -10,6 +10,7 @@
  *
  *     cov(i s, j t) = 4/9 sigma_is sigma_jt C_st k_ij I          displacement and turn
  *                   + d_is d_jt' + h_is h_jt' + l_s l_t'         volume, heart, sliding
+ *                   + c_is c_jt'                                 collapse
  *                   + 4/9 (6.2 mm)^2 k_ij I                      another day, if asked for
  *
  *     sigma   expected error of the terms displacement and turn (supine/locate.h), mm
@@ -17,7 +18,9 @@
  * in one lung and 1/3 between two C_st    correlation of two states, common to all points: (V_s +
  * V_t - V_st) / (2 sqrt(V_s V_t)), V the mean sigma^2 of all vertices, V_st that from state s to
  * state t. Negative eigenvalues are set to 0, and the diagonal then to 1 d       shift of the point
- * by one standard deviation of an assumed volume, mm, which moves all points together h, l    12 mm
+ * by one standard deviation of an assumed volume, mm, which moves all points together
+ *     c       way from the healthy to the collapsed lung, mm (supine/locate.h)
+ *     h, l    12 mm
  * b_i Dg_xy and 3 mm Dg_x, vectors across the body and along x (supine/locate.h)
  *
  * 4/9 is 4/3 over three axes: sigma was measured after the best translation had been taken out,
