@@ -200,28 +200,39 @@ static supine_status describe(segmentation *s) {
   return read_pixels(s);
 }
 
-/* Codes of lungs and lobes in SNOMED CT, and the side of each. The lungs in general have it in a
- * modifier. */
+/* Codes of lungs and lobes in SNOMED CT. Those of DICOM's own lists (CID 7155) name no side, which
+ * is then in a modifier, as TotalSegmentator and 3D Slicer write it. */
+enum { LEFT, RIGHT, BY_MODIFIER };
 static const struct {
   const char *code;
-  int side; /* 0: left, 1: right */
-} lungs[] = {{"44029006", 0}, {"45653009", 0}, {"90572001", 0}, {"3341006", 1},
-             {"42400003", 1}, {"72481006", 1}, {"266005", 1}};
+  int side;
+} lungs[] = {
+    {"39607008", BY_MODIFIER}, /* lung */
+    {"45653009", BY_MODIFIER}, /* upper lobe of lung */
+    {"90572001", BY_MODIFIER}, /* lower lobe of lung */
+    {"40020002", RIGHT},       /* middle lobe of lung */
+    {"72481006", RIGHT},       /* middle lobe of right lung */
+    {"44029006", LEFT},        /* left lung */
+    {"44714003", LEFT},        /* upper lobe of left lung */
+    {"41224006", LEFT},        /* lower lobe of left lung */
+    {"3341006", RIGHT},        /* right lung */
+    {"42400003", RIGHT},       /* upper lobe of right lung */
+    {"266005", RIGHT},         /* lower lobe of right lung */
+};
 
-/* Return the side of the lung that a segment shows: 0 left, 1 right, -1 none. */
+/* Return the side of the lung that a segment shows: LEFT, RIGHT, or -1 if it shows none. */
 static int side_of(const json_t *segment) {
   const json_t *type = item(segment, SEGMENT_CODE, 0);
   const char *code = text(type, CODE_VALUE);
   const char *modifier = text(item(type, CODE_MODIFIER, 0), CODE_VALUE);
+  int stated = strcmp(modifier, "7771000") == 0 ? LEFT : -1;
+  stated = strcmp(modifier, "24028007") == 0 ? RIGHT : stated;
   for (size_t i = 0; i < sizeof lungs / sizeof *lungs; ++i) {
     if (strcmp(code, lungs[i].code) == 0) {
-      return lungs[i].side;
+      return lungs[i].side == BY_MODIFIER ? stated : lungs[i].side;
     }
   }
-  if (strcmp(code, "39607008") == 0 && strcmp(modifier, "7771000") == 0) {
-    return 0;
-  }
-  return strcmp(code, "39607008") == 0 && strcmp(modifier, "24028007") == 0 ? 1 : -1;
+  return -1;
 }
 
 /* List the segments that show lungs by their codes, as labels: "left=1+2,right=3". */

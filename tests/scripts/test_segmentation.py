@@ -27,9 +27,14 @@ if shutil.which("dcm2json") is None:
 
 supine, lungs, guide = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
 SEG, RTSTRUCT, CT = "1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.481.3", "1.2.840.10008.5.1.4.1.1.2"
-# Segments: the file of a lobe, and its code in SNOMED CT.
-LOBES = {"lung_upper_lobe_left": "45653009", "lung_lower_lobe_left": "90572001", "lung_upper_lobe_right": "42400003",
-         "lung_middle_lobe_right": "72481006", "lung_lower_lobe_right": "266005"}
+# Segments: the file of a lobe, its code in SNOMED CT with the side in a modifier, as TotalSegmentator and 3D Slicer
+# write it (DICOM CID 7155), and the code that has the side in it.
+LEFT, RIGHT = "7771000", "24028007"
+LOBES = {"lung_upper_lobe_left": ("45653009", LEFT, "44714003"),
+         "lung_lower_lobe_left": ("90572001", LEFT, "41224006"),
+         "lung_upper_lobe_right": ("45653009", RIGHT, "42400003"),
+         "lung_middle_lobe_right": ("40020002", "", "72481006"),
+         "lung_lower_lobe_right": ("90572001", RIGHT, "266005")}
 NUMBERS = {name: number for number, name in enumerate(LOBES, 3)}
 
 
@@ -41,7 +46,8 @@ def items(**members):
 
 
 def write(path, masks, codes, affine, fractional=False, kind=SEG, syntax=ExplicitVRLittleEndian, shift=0.0):
-    """Write {number: mask [i, j, k]} as a segmentation, its frames in any order and without those that are empty."""
+    """Write {number: mask [i, j, k]} as a segmentation, its frames in any order and without those that are empty. Codes
+    are {number: (code, code of its modifier)}."""
     lps = np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
     spacing = np.linalg.norm(lps[:3, :3], axis=0)
     one = Dataset()
@@ -52,10 +58,15 @@ def write(path, masks, codes, affine, fractional=False, kind=SEG, syntax=Explici
     one.SOPClassUID, one.Modality, one.PatientID = kind, "SEG", "synthetic"
     one.SegmentationType = "FRACTIONAL" if fractional else "BINARY"
     one.Rows, one.Columns = next(iter(masks.values())).shape[1::-1]
-    one.SegmentSequence = [
-        items(SegmentNumber=number, SegmentLabel=f"segment {number}", SegmentedPropertyTypeCodeSequence=items(
-            CodeValue=codes.get(number, "10200004"), CodingSchemeDesignator="SCT", CodeMeaning="a part"))[0]
-        for number in masks]
+    one.SegmentSequence = []
+    for number in masks:
+        code, modifier = codes.get(number, ("10200004", ""))
+        kind_of_part = items(CodeValue=code, CodingSchemeDesignator="SCT", CodeMeaning="a part")
+        if modifier:
+            kind_of_part[0].SegmentedPropertyTypeModifierCodeSequence = items(
+                CodeValue=modifier, CodingSchemeDesignator="SCT", CodeMeaning="a side")
+        one.SegmentSequence += items(SegmentNumber=number, SegmentLabel=f"segment {number}",
+                                     SegmentedPropertyTypeCodeSequence=kind_of_part)
     one.SharedFunctionalGroupsSequence = items(
         PixelMeasuresSequence=items(PixelSpacing=[spacing[1], spacing[0]], SliceThickness=spacing[2],
                                     SpacingBetweenSlices=spacing[2]),
@@ -107,7 +118,8 @@ with tempfile.TemporaryDirectory() as folder:
                    stdout=subprocess.DEVNULL)
     images = {name: nibabel.load(f"segmentation/{name}.nii.gz") for name in LOBES}
     affine = next(iter(images.values())).affine
-    codes = {NUMBERS[name]: code for name, code in LOBES.items()}
+    codes = {NUMBERS[name]: (code, side) for name, (code, side, _) in LOBES.items()}
+    sided = {NUMBERS[name]: (code, "") for name, (_, _, code) in LOBES.items()}
     labels = np.zeros(next(iter(images.values())).shape, np.uint8)
     for name, image in images.items():  # the lungs overlap a little
         labels[np.asarray(image.dataobj) > 0] = NUMBERS[name]
@@ -121,7 +133,7 @@ with tempfile.TemporaryDirectory() as folder:
     volume = {side: sum(masks[n].sum() for n in numbers) * abs(np.linalg.det(affine)) / 1000
               for side, numbers in (("left", (3, 4)), ("right", (5, 6, 7)))}
     write("binary.dcm", everything, codes, affine)
-    write("fractional.dcm", masks, codes, affine, fractional=True)
+    write("fractional.dcm", masks, sided, affine, fractional=True)
     write("uncoded.dcm", masks, {}, affine)
     for source, options in (("binary.dcm", ()), ("fractional.dcm", ()),
                             ("uncoded.dcm", ("--labels", "left=3+4,right=5+6+7"))):
