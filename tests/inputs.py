@@ -38,6 +38,14 @@ def made(path, **options):
             "Python": lambda: python(lambda: supine.precompute(path, **options))}
 
 
+def nearest_to_line(first, second):
+    """Return two vertices and the third that lies nearest to the line through them, between them."""
+    a, b = lungs.vertices[[first, second]]
+    share = np.clip((lungs.vertices - a) @ (b - a) / ((b - a) @ (b - a)), 0.2, 0.8)
+    away = np.linalg.norm(lungs.vertices - a - share[:, None] * (b - a), axis=1)
+    return first, second, int(away.argmin())
+
+
 def registered(*vertices):
     """Register the lungs at vertices."""
     def by_command():
@@ -265,7 +273,8 @@ CASES = {
     "content-outside": (lambda: embedded(-100), lambda: embedded(solid[:, 2].max() + 20), "told"),
     "device-name": (tracked("OK"), tracked("OK", "a_name_of_21_letters_"), "refused"),
     "tracker-invalid": (tracked("OK"), tracked("INVALID"), "told"),
-    "frame-line": (lambda: registered(0, 100, 200, lungs.vertex_count - 1), lambda: registered(0, 1, 2), "refused"),
+    "frame-line": (lambda: registered(0, 100, 200, lungs.vertex_count - 1),
+                   lambda: registered(*nearest_to_line(0, 1)), "refused"),
     "height-least": (made("lungs.ply", height=160, sex="female"), made("lungs.ply", height=135, sex="female"), "told"),
     "height-most": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=200, sex="male"), "told"),
     "rest-share": (made("lungs.ply", height=180, sex="male"), made("lungs.ply", height=230, sex="male"), "refused"),

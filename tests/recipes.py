@@ -117,12 +117,12 @@ static supine_status write_corners(const char *path, const supine_mesh *mesh, su
                        SUPINE_INPUT_REFUSED,
                    error, SUPINE_ERROR_ARGUMENT, "%zu vertices: give fewer", wanted->vertices);
   SUPINE_TRY(supine_lungs_phantom_create("""),
-    ("  (void)supine_print(stdout", """  if (wanted->corners != NULL) {
+    ("  supine_options_line(", """  if (wanted->corners != NULL) {
     SUPINE_TRY(write_corners(wanted->corners, &mesh, error));
   }
-  (void)supine_print(stdout"""),
-    ('#include "base/number.h"\n',
-     '#include "base/number.h"\n#include "base/output.h"\n\n#include <supine/inputs.h>\n')]
+  supine_options_line("""),
+    ('#include "base/arena.h"\n',
+     '#include "base/arena.h"\n#include "base/number.h"\n#include "base/output.h"\n\n#include <supine/inputs.h>\n')]
 
 
 def check(holds, what):

@@ -38,7 +38,7 @@ state_of = lambda basis, state: basis.deform(basis.pose(state)).astype(float)
 def write_inputs():
     """Write right inputs and such with a mistake."""
     for name, scale in (("right", 1), ("ras", RAS), ("mirrored", FLIP), ("metres", 1e-3), ("mouse", 1 / 22),
-                        ("small", 0.7)):
+                        ("small", 0.9)):
         write_ply(name + ".ply", surface * scale, faces[:, ::-1] if name == "mirrored" else faces)
     write_ply("rest.ply", state_of(lungs, STATE), faces)
     image = voxels_of(grid)
@@ -70,6 +70,7 @@ def precompute(*words, end=QUICK):
 
 
 MAP = ("--edge", "12")
+PERSON = ("--height", "190cm", "--sex", "male")
 VALIDATE = ("validate", "lungs.st", "--from", "supine:full")
 CASES = {
     "axes": (precompute("ras.ply"), precompute("right.ply"), {"axes"}),
@@ -90,8 +91,8 @@ CASES = {
     "close of a surface": (precompute("right.ply", "--close", "3"), precompute("right.ply"), {"close"}),
     "surfaces of a surface": (precompute("right.ply", "--surfaces-out", "x.ply"), precompute("right.ply"),
                               {"surfaces-out"}),
-    "small at full inflation": (precompute("small.ply"), precompute("small.ply", "--scanned", "supine:rest"),
-                                {"scanned"}),
+    "small at full inflation": (precompute("small.ply", *PERSON),
+                                precompute("small.ply", *PERSON, "--scanned", "supine:rest"), {"scanned"}),
     "large at rest": (precompute("right.ply", "--scanned", "supine:rest"), None, set()),
     "rest above full": (precompute("right.ply", "--resting", "supine=7500mL"), None, set()),
     "law and scanned": (precompute("right.ply", "--law", "paper", "--scanned", "supine:rest+1000"),

@@ -47,7 +47,7 @@ async function checkKeys(page) {
     assert.equal(await page.locator('#posture-name').inputValue(), posture);
   }
   await press('n');
-  assert.match(await page.locator('#pinned').textContent(), /supine\+15/);
+  assert.match(await page.locator('#pinned').textContent(), /supine, head 15 degrees down/);
   await press('1', 'n');
   const camera = await state(page, 'camera');
   await press('ArrowLeft', 'ArrowUp', '+', 'Shift+ArrowRight');
