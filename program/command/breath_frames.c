@@ -29,10 +29,10 @@ typedef struct playing {
   /* [frames] expected errors, RMS over the vertices, mm: of the displacements, and of the positions
    * in the session of the scan and on another day */
   double *moved_error, *expected_error, *another_day_error;
-  double *volumes;     /* [frames, lungs] volume of gas and tissue, mL */
-  double *total;       /* [frames] sum of `volumes` over the lungs, mL */
-  supine_mesh mesh;    /* triangles; for VTP output, also the positions of the current frame */
-  float *normals;      /* [N, 3] normals of the current frame, for VTP output */
+  double *volumes;  /* [frames, lungs] volume of gas and tissue, mL */
+  double *total;    /* [frames] sum of `volumes` over the lungs, mL */
+  supine_mesh mesh; /* triangles; for VTP output, also the positions of the current frame */
+  float *normals;   /* [N, 3] normals of the current frame, for VTP output */
   float *positions; /* [N, 3] current frame, mm; followed by all frames unless the output is VTP */
   double *compute_time; /* [frames] s */
   double *origin;       /* [N, 3] positions from which displacements are measured, mm */
@@ -100,7 +100,7 @@ static void report(const playing *p) {
                       p->wanted->breath.fps, least, largest);
   supine_options_line("compute time per frame: median %.3f ms, longest %.3f ms, allowed %.0f ms\n",
                       1e3 * median, 1e3 * longest, 1e3 * budget);
-  supine_options_add(json_pack(
+  SUPINE_ADD_RESULT(json_pack(
       "{s:o, s:I, s:f, s:[f, f], s:f, s:f}", "file", supine_options_json_text(p->wanted->path),
       "frames", (json_int_t)p->wanted->breath.count, "frames_per_second", p->wanted->breath.fps,
       "volume_ml", least, largest, "median_compute_ms", 1e3 * median, "longest_compute_ms",

@@ -139,7 +139,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   moved.errors = errors;
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   supine_options_next_result();
-  supine_options_add(json_pack("{s:s}", "caveats", caveats));
+  SUPINE_ADD_RESULT(json_pack("{s:s}", "caveats", caveats));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s%s", moved.from.name,
                  frame_of(&wanted->frame), by, caveats);
   moved.save.comment = comment;

@@ -262,9 +262,9 @@ static supine_status write_points(const char *path, const supine_basis *basis,
   }
   supine_options_line("%s: %zu %s%s, %s, displacement from %s\n", path, count,
                       each ? "point" : "structure", count == 1 ? "" : "s", state, moved->from.name);
-  supine_options_add(json_pack("{s:o, s:I, s:s, s:s}", "file", supine_options_json_text(path),
-                               each ? "points" : "structures", (json_int_t)count, "state", state,
-                               "displacement_from", moved->from.name));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:s, s:s}", "file", supine_options_json_text(path),
+                              each ? "points" : "structures", (json_int_t)count, "state", state,
+                              "displacement_from", moved->from.name));
   return SUPINE_OK;
 }
 
@@ -283,10 +283,10 @@ static supine_status write_field(const supine_deform_content *wanted, const char
   supine_options_line("%s: %s field of %zu x %zu x %zu nodes\n", wanted->field,
                       wanted->inverse ? "inverse" : "forward", nodes->size[0], nodes->size[1],
                       nodes->size[2]);
-  supine_options_add(json_pack("{s:{s:o, s:[I, I, I], s:b}}", "field", "file",
-                               supine_options_json_text(wanted->field), "nodes",
-                               (json_int_t)nodes->size[0], (json_int_t)nodes->size[1],
-                               (json_int_t)nodes->size[2], "inverse", (int)wanted->inverse));
+  SUPINE_ADD_RESULT(json_pack("{s:{s:o, s:[I, I, I], s:b}}", "field", "file",
+                              supine_options_json_text(wanted->field), "nodes",
+                              (json_int_t)nodes->size[0], (json_int_t)nodes->size[1],
+                              (json_int_t)nodes->size[2], "inverse", (int)wanted->inverse));
   return SUPINE_OK;
 }
 
@@ -304,25 +304,43 @@ static supine_status write_image(const char *path, const supine_image *source, b
   const size_t *size = source->size;
   supine_options_line("%s: %zu x %zu x %zu voxels%s\n", path, size[0], size[1], size[2],
                       tissue != NULL ? ", densities scaled inside the lungs" : "");
-  supine_options_add(json_pack("{s:{s:o, s:[I, I, I], s:b}}", labels ? "labels" : "image", "file",
-                               supine_options_json_text(path), "voxels", (json_int_t)size[0],
-                               (json_int_t)size[1], (json_int_t)size[2], "densities_scaled",
-                               (int)(tissue != NULL)));
+  SUPINE_ADD_RESULT(json_pack("{s:{s:o, s:[I, I, I], s:b}}", labels ? "labels" : "image", "file",
+                              supine_options_json_text(path), "voxels", (json_int_t)size[0],
+                              (json_int_t)size[1], (json_int_t)size[2], "densities_scaled",
+                              (int)(tissue != NULL)));
   return SUPINE_OK;
+}
+
+/* Return an amount for each lung, by its name. */
+static json_t *list_amounts(const supine_basis_info *info, const double *amount) {
+  json_t *lungs = json_object();
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    (void)json_object_set_new(lungs, info->lung_names[lung],
+                              supine_options_json_number(amount[lung]));
+  }
+  return lungs;
 }
 
 /* Print an amount for each lung, mL; `key` is its name in JSON. */
 static void print_lungs(const supine_basis *basis, const double *amount, const char *format,
                         const char *key) {
   const supine_basis_info *info = supine_basis_get_info(basis);
-  json_t *lungs = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     supine_options_line("%s%s ", lung == 0 ? "" : ", ", info->lung_names[lung]);
     supine_options_line(format, amount[lung]);
-    (void)json_object_set_new(lungs, info->lung_names[lung],
-                              supine_options_json_number(amount[lung]));
   }
-  supine_options_add(json_pack("{s:o}", key, lungs));
+  SUPINE_ADD_RESULT(json_pack("{s:o}", key, list_amounts(info, amount)));
+}
+
+/* Return the rigid parts: the volume and the centre of each. */
+static json_t *list_parts(const supine_tissue *soft) {
+  json_t *parts = json_array();
+  for (size_t i = 0; i < soft->part_count; ++i) {
+    const double *at = soft->parts[i].centre;
+    (void)json_array_append_new(parts, json_pack("{s:f, s:o}", "volume_ml", soft->parts[i].volume,
+                                                 "centre", supine_options_json_numbers(3, at)));
+  }
+  return parts;
 }
 
 /* Find the soft tissue of the image, and the parts that --rigid names, unless that is done. */
@@ -349,15 +367,12 @@ static supine_status find_tissue(const supine_deform_content *wanted, const supi
   }
   SUPINE_TRY(supine_warp_tissue_add_labels(&wanted->label_source, wanted->rigid.value,
                                            wanted->rigid.count, soft, error));
-  json_t *parts = json_array();
   for (size_t i = 0; i < soft->part_count; ++i) {
     const double *at = soft->parts[i].centre;
-    (void)json_array_append_new(parts, json_pack("{s:f, s:o}", "volume_ml", soft->parts[i].volume,
-                                                 "centre", supine_options_json_numbers(3, at)));
     supine_options_line("rigid part of %.1f mL at %.0f, %.0f, %.0f mm (LPS)\n",
                         soft->parts[i].volume, at[0], at[1], at[2]);
   }
-  supine_options_add(json_pack("{s:o}", "rigid_parts", parts));
+  SUPINE_ADD_RESULT(json_pack("{s:o}", "rigid_parts", list_parts(soft)));
   wanted->tissue->found = true;
   return SUPINE_OK;
 }
@@ -390,8 +405,8 @@ static supine_status invert(const supine_field *forward, supine_field *inverse,
   supine_options_line(
       "field followed by inverse: residual %s mm RMS, %s mm at most, inside the lungs\n",
       supine_text_distance(residual.rms).text, supine_text_distance(residual.largest).text);
-  supine_options_add(json_pack("{s:{s:f, s:f}}", "inverse_residual_mm", "rms", residual.rms,
-                               "largest", residual.largest));
+  SUPINE_ADD_RESULT(json_pack("{s:{s:f, s:f}}", "inverse_residual_mm", "rms", residual.rms,
+                              "largest", residual.largest));
   if (residual.lost > 0) {
     supine_options_say("deform",
                        "warning: the field folds and has no inverse at %zu of its nodes inside the "
@@ -485,13 +500,24 @@ static supine_status move_grid(const supine_deform_content *wanted, const supine
   return SUPINE_OK;
 }
 
+/* Return the volume of each lung with its range and source. */
+static json_t *list_volumes(const supine_basis *basis, const supine_deformation *moved) {
+  const supine_basis_info *info = supine_basis_get_info(basis);
+  json_t *lungs = json_object();
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
+    (void)json_object_set_new(lungs, info->lung_names[lung],
+                              supine_options_volume_json(&held, false));
+  }
+  return lungs;
+}
+
 /* Print the range of the volume of all lungs if it was assumed from other people. */
 static void print_range(const supine_basis *basis, const supine_deformation *moved) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double low = 0.0;
   double high = 0.0;
   bool assumed = false;
-  json_t *lungs = json_object();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
     const supine_fact held = supine_basis_lung_volume(basis, &moved->state, &moved->pose, lung);
     low += isfinite(held.low) ? held.low : held.value;
@@ -506,10 +532,8 @@ static void print_range(const supine_basis *basis, const supine_deformation *mov
     if (held.source == SUPINE_SOURCE_COLLAPSED) {
       supine_options_line("; the %s lung is collapsed: %.0f mL", held.name, held.value);
     }
-    (void)json_object_set_new(lungs, info->lung_names[lung],
-                              supine_options_volume_json(&held, false));
   }
-  supine_options_add(json_pack("{s:o}", "lungs_ml", lungs));
+  SUPINE_ADD_RESULT(json_pack("{s:o}", "lungs_ml", list_volumes(basis, moved)));
 }
 
 /* Warn of each embedded part whose surface folds between the positions `from` and `to`. */
@@ -617,15 +641,15 @@ static supine_status write_surface(const char *path, const supine_basis *basis,
   supine_options_line("%s: gravity %.4g,%.4g,%.4g, largest displacement %s mm from %s", path,
                       gravity[0], gravity[1], gravity[2], supine_text_distance(largest).text,
                       moved->from.name);
-  supine_options_add(json_pack("{s:o, s:o, s:s, s:f}", "file", supine_options_json_text(path),
-                               "gravity", supine_options_json_numbers(3, gravity),
-                               "displacement_from", moved->from.name, "largest_displacement_mm",
-                               largest));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:o, s:s, s:f}", "file", supine_options_json_text(path),
+                              "gravity", supine_options_json_numbers(3, gravity),
+                              "displacement_from", moved->from.name, "largest_displacement_mm",
+                              largest));
   const bool content = supine_basis_metadata(basis, "content") != NULL;
   if (!content) {
     const double held = 1e-3 * supine_mesh_volume(&mesh);
-    supine_options_add(json_pack("{s:f, s:f}", "volume_ml", held, "volume_change_ml",
-                                 held - 1e-3 * supine_mesh_volume(&from)));
+    SUPINE_ADD_RESULT(json_pack("{s:f, s:f}", "volume_ml", held, "volume_change_ml",
+                                held - 1e-3 * supine_mesh_volume(&from)));
     supine_options_line(", %.2f mL (%+.2f mL)", held, held - 1e-3 * supine_mesh_volume(&from));
     print_range(basis, moved);
   }
@@ -638,7 +662,7 @@ static void print_errors(const supine_deformation *moved) {
   const supine_expected *position = &moved->errors.position;
   const supine_expected *displacement = &moved->errors.moved;
   if (position->sigma != NULL) {
-    supine_options_add(
+    SUPINE_ADD_RESULT(
         json_pack("{s:{s:f, s:f, s:o}, s:{s:f, s:f}}", "expected_error_mm", "rms", position->rms,
                   "largest", position->largest, "another_day",
                   position->another == NULL ? json_null() : json_real(position->another_rms),
@@ -670,10 +694,10 @@ static void print_frame(const supine_deformation *moved) {
     return;
   }
   const supine_hilum *hilum = &moved->hilum;
-  supine_options_add(json_pack("{s:{s:o, s:o, s:b}}", "hilum", "moved_mm",
-                               supine_options_json_numbers(3, hilum->move), "expected_error_mm",
-                               supine_options_json_number(hilum->expected), "subtracted",
-                               (int)moved->subtract_hilum));
+  SUPINE_ADD_RESULT(json_pack("{s:{s:o, s:o, s:b}}", "hilum", "moved_mm",
+                              supine_options_json_numbers(3, hilum->move), "expected_error_mm",
+                              supine_options_json_number(hilum->expected), "subtracted",
+                              (int)moved->subtract_hilum));
   if (supine_length(hilum->move) > 0.0 && supine_length(hilum->move) < 0.1) {
     supine_options_line("the hilum moves by less than 0.1 mm\n");
   } else if (supine_length(hilum->move) > 0.0) {

@@ -145,10 +145,10 @@ supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
   (void)supine_state_describe(state, text, sizeof text);
   SUPINE_TRY(save(wanted, &s, text, positions, error));
   const double distance = sqrt(square / (double)(s.vertices * wanted->count));
-  supine_options_add(
-      json_pack("{s:o, s:I, s:I, s:s, s:I, s:f}", "file", supine_options_json_text(wanted->path),
-                "samples", (json_int_t)wanted->count, "points", (json_int_t)s.vertices, "state",
-                text, "seed", (json_int_t)wanted->seed, "distance_rms_mm", distance));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I, s:s, s:I, s:f}", "file",
+                              supine_options_json_text(wanted->path), "samples",
+                              (json_int_t)wanted->count, "points", (json_int_t)s.vertices, "state",
+                              text, "seed", (json_int_t)wanted->seed, "distance_rms_mm", distance));
   supine_options_line("%s: %zu sample%s of %zu point%s, %s, seed %zu: %.1f mm (RMS) from the "
                       "prediction%s\n",
                       wanted->path, wanted->count, wanted->count == 1 ? "" : "s", s.vertices,

@@ -2,16 +2,39 @@
 /* Write the ventilation of 'supine deform', and print it for lungs and labels. */
 #include "program/command/deform_ventilation.h"
 
+#include <math.h>
+
 #include "base/number.h"
 #include "precompute/warp/ventilation.h"
 
-/* Print what a part holds and takes in, and return it as JSON. */
-static json_t *print_part(const char *name, const supine_ventilated *part) {
-  const double share = part->held > 0.0 ? part->taken / part->held : (double)NAN;
-  supine_options_line("  %s: %.1f mL hold %+.1f mL more (%+.1f %%)", name, part->held, part->taken,
-                      100.0 * share);
-  return json_pack("{s:s, s:f, s:f, s:o}", "name", name, "held_ml", part->held, "taken_ml",
-                   part->taken, "share", supine_options_json_number(share));
+/* A line of the table: a lung or a label. */
+typedef struct part {
+  char name[40];
+  supine_ventilated sum;
+  double surface; /* what the lung's surface takes in, mL; NaN if that is not known */
+} part;
+
+static void print_parts(const part *parts, size_t count) {
+  for (const part *p = parts; p < parts + count; ++p) {
+    supine_options_line("  %s: %.1f mL hold %+.1f mL more (%+.1f %%)", p->name, p->sum.held,
+                        p->sum.taken, 100.0 * p->sum.taken / p->sum.held);
+    if (!isnan(p->surface)) {
+      supine_options_line("; its surface: %+.1f mL", p->surface);
+    }
+    supine_options_line("\n");
+  }
+}
+
+static json_t *list_parts(const part *parts, size_t count) {
+  json_t *list = json_array();
+  for (const part *p = parts; p < parts + count; ++p) {
+    (void)json_array_append_new(
+        list,
+        json_pack("{s:s, s:f, s:f, s:o, s:o}", "name", p->name, "held_ml", p->sum.held, "taken_ml",
+                  p->sum.taken, "share", supine_options_json_number(p->sum.taken / p->sum.held),
+                  "surface_taken_ml", supine_options_json_number(p->surface)));
+  }
+  return list;
 }
 
 static void print_lungs(const supine_basis *basis, const supine_deformation *moved,
@@ -19,30 +42,27 @@ static void print_lungs(const supine_basis *basis, const supine_deformation *mov
   const supine_basis_info *info = supine_basis_get_info(basis);
   double before[SUPINE_LUNGS_MAX];
   double after[SUPINE_LUNGS_MAX];
+  part parts[SUPINE_LUNGS_MAX];
   const bool known = supine_basis_volumes(basis, &moved->from.pose, before) == SUPINE_OK &&
                      supine_basis_volumes(basis, &moved->pose, after) == SUPINE_OK;
-  json_t *list = json_array();
   for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    json_t *row = print_part(info->lung_names[lung], &lungs[lung]);
-    if (known) {
-      supine_options_line("; its surface: %+.1f mL", after[lung] - before[lung]);
-      (void)json_object_set_new(row, "surface_taken_ml", json_real(after[lung] - before[lung]));
-    }
-    supine_options_line("\n");
-    (void)json_array_append_new(list, row);
+    parts[lung] =
+        (part){.sum = lungs[lung], .surface = known ? after[lung] - before[lung] : (double)NAN};
+    (void)snprintf(parts[lung].name, sizeof parts[lung].name, "%s", info->lung_names[lung]);
   }
-  supine_options_add(json_pack("{s:o}", "ventilation_of_lungs", list));
+  print_parts(parts, info->lung_count);
+  SUPINE_ADD_RESULT(
+      json_pack("{s:o}", "ventilation_of_lungs", list_parts(parts, info->lung_count)));
 }
 
-static void print_labels(const supine_ventilated *parts, size_t count) {
-  json_t *list = json_array();
+static void print_labels(const supine_ventilated *labels, size_t count) {
+  part parts[SUPINE_VENTILATED_MOST];
   for (size_t i = 0; i < count; ++i) {
-    char name[40];
-    (void)supine_print_text(name, sizeof name, "label %.9g", parts[i].label);
-    (void)json_array_append_new(list, print_part(name, &parts[i]));
-    supine_options_line("\n");
+    parts[i] = (part){.sum = labels[i], .surface = (double)NAN};
+    (void)supine_print_text(parts[i].name, sizeof parts[i].name, "label %.9g", labels[i].label);
   }
-  supine_options_add(json_pack("{s:o}", "ventilation_of_labels", list));
+  print_parts(parts, count);
+  SUPINE_ADD_RESULT(json_pack("{s:o}", "ventilation_of_labels", list_parts(parts, count)));
 }
 
 supine_status supine_command_deform_ventilation(const supine_deform_content *wanted,
@@ -67,7 +87,7 @@ supine_status supine_command_deform_ventilation(const supine_deform_content *wan
                                 error));
   supine_options_line("%s: gain of volume from %s, as a share of the volume there\n",
                       wanted->ventilation, moved->from.name);
-  supine_options_add(
+  SUPINE_ADD_RESULT(
       json_pack("{s:o}", "ventilation", supine_options_json_text(wanted->ventilation)));
   print_lungs(basis, moved, lungs);
   print_labels(parts, count);

@@ -123,19 +123,19 @@ static void print_summary(const supine_inside_shells *shells, const supine_insid
   }
 }
 
-/* Add what --json prints: what was embedded, and how much of it lies outside the lungs. */
-static void add_summary(const supine_inside_shells *shells, const supine_inside_report *report,
-                        const request *wanted) {
+/* Return what --json prints: what was embedded, and how much of it lies outside the lungs. */
+static json_t *list_summary(const supine_inside_shells *shells, const supine_inside_report *report,
+                            const request *wanted) {
   const supine_basis_info *info = supine_basis_get_info(shells->basis);
   json_t *lungs = json_object();
   for (size_t lung = 0; lung < shells->count; ++lung) {
     (void)json_object_set_new(lungs, info->lung_names[lung],
                               json_integer((json_int_t)report->in_lung[lung]));
   }
-  supine_options_add(json_pack(
-      "{s:o, s:I, s:o, s:I, s:I, s:f}", "file", supine_options_json_text(wanted->path), "points",
-      (json_int_t)report->count, "points_in_lung", lungs, "rigid_parts", (json_int_t)report->rigid,
-      "outside", (json_int_t)report->outside, "farthest_outside_mm", report->farthest_mm));
+  return json_pack("{s:o, s:I, s:o, s:I, s:I, s:f}", "file", supine_options_json_text(wanted->path),
+                   "points", (json_int_t)report->count, "points_in_lung", lungs, "rigid_parts",
+                   (json_int_t)report->rigid, "outside", (json_int_t)report->outside,
+                   "farthest_outside_mm", report->farthest_mm);
 }
 
 static supine_status embed(const supine_basis *basis, const request *wanted,
@@ -161,7 +161,7 @@ static supine_status embed(const supine_basis *basis, const request *wanted,
   SUPINE_TRY(supine_inside_embed(&shells, &content, &options, wanted->path, &report, error));
   supine_options_say_findings(name, &report.findings);
   print_summary(&shells, &content, &report, wanted);
-  add_summary(&shells, &report, wanted);
+  SUPINE_ADD_RESULT(list_summary(&shells, &report, wanted));
   return SUPINE_OK;
 }
 

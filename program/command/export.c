@@ -72,9 +72,9 @@ static void print_simplified(const supine_basis *basis, const export_written *wr
                       "the whole surface\n",
                       supine_basis_get_info(basis)->vertex_count, written->vertices, written->rms,
                       written->largest);
-  supine_options_add(json_pack("{s:{s:I, s:f, s:f}}", "simplified", "vertices",
-                               (json_int_t)written->vertices, "rms_mm", written->rms, "largest_mm",
-                               written->largest));
+  SUPINE_ADD_RESULT(json_pack("{s:{s:I, s:f, s:f}}", "simplified", "vertices",
+                              (json_int_t)written->vertices, "rms_mm", written->rms, "largest_mm",
+                              written->largest));
 }
 
 static supine_status write_glb(const supine_basis *basis, const request *wanted,
@@ -90,8 +90,8 @@ static supine_status write_glb(const supine_basis *basis, const request *wanted,
                       wanted->glb.plain ? ""
                                         : ", compressed; for model-viewer, set its "
                                           "meshoptDecoderLocation or use --plain");
-  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
-                               "lungs", (json_int_t)lungs, "bytes", (json_int_t)bytes));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                              "lungs", (json_int_t)lungs, "bytes", (json_int_t)bytes));
   if (wanted->simplify > 0) {
     print_simplified(basis, &written);
   }
@@ -169,9 +169,9 @@ static supine_status write_page(supine_basis *basis, const request *wanted, cons
                         names.count == 1 ? "" : "s");
   }
   supine_options_line("; open it in any browser\n");
-  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
-                               "vertices", (json_int_t)written.vertices, "structures",
-                               (json_int_t)names.count));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                              "vertices", (json_int_t)written.vertices, "structures",
+                              (json_int_t)names.count));
   if (wanted->simplify > 0) {
     print_simplified(basis, &written);
   }

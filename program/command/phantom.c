@@ -33,10 +33,10 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   const double volume = 1e-3 * supine_mesh_volume(&mesh);
   supine_options_line("%s: two lungs, %zu vertices, %zu triangles, %.1f mL\n", wanted->path,
                       mesh.vertex_count, mesh.triangle_count, volume);
-  supine_options_add(json_pack("{s:o, s:I, s:I, s:f}", "file",
-                               supine_options_json_text(wanted->path), "vertices",
-                               (json_int_t)mesh.vertex_count, "triangles",
-                               (json_int_t)mesh.triangle_count, "volume_ml", volume));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I, s:f}", "file",
+                              supine_options_json_text(wanted->path), "vertices",
+                              (json_int_t)mesh.vertex_count, "triangles",
+                              (json_int_t)mesh.triangle_count, "volume_ml", volume));
   return SUPINE_OK;
 }
 

@@ -141,7 +141,7 @@ static json_t *errors_json(const supine_precompute_errors *errors, double factor
 /* Add what --json prints of the basis: its size, what it assumes, and its errors. */
 static void add_report(const request *wanted, const supine_basis *basis,
                        const supine_precompute_report *report) {
-  supine_options_add(json_pack(
+  SUPINE_ADD_RESULT(json_pack(
       "{s:o, s:I, s:I, s:I, s:I, s:o, s:I, s:o, s:o}", "file",
       supine_options_json_text(wanted->path), "lungs", (json_int_t)report->lung_count, "vertices",
       (json_int_t)report->vertex_count, "band", (json_int_t)report->band, "modes",
@@ -149,8 +149,8 @@ static void add_report(const request *wanted, const supine_basis *basis,
       (json_int_t)report->direction_count, "error_percent", errors_json(&report->relative, 100.0),
       "error_mm", errors_json(&report->mm, 1.0)));
   if (report->volume_count > 0) {
-    supine_options_add(json_pack("{s:I, s:I}", "volumes", (json_int_t)report->volume_count,
-                                 "clusters", (json_int_t)report->cluster_count));
+    SUPINE_ADD_RESULT(json_pack("{s:I, s:I}", "volumes", (json_int_t)report->volume_count,
+                                "clusters", (json_int_t)report->cluster_count));
   }
 }
 

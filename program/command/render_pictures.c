@@ -265,9 +265,9 @@ static supine_status fill_panels(studio *s, supine_error *error) {
 }
 
 static void add_result(const char *path, const supine_picture *picture, size_t frames) {
-  supine_options_add(json_pack("{s:o, s:I, s:I, s:I}", "file", supine_options_json_text(path),
-                               "width", (json_int_t)picture->width, "height",
-                               (json_int_t)picture->height, "frames", (json_int_t)frames));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I, s:I}", "file", supine_options_json_text(path),
+                              "width", (json_int_t)picture->width, "height",
+                              (json_int_t)picture->height, "frames", (json_int_t)frames));
 }
 
 static supine_status draw_postures(studio *s, supine_error *error) {

@@ -75,8 +75,8 @@ static supine_status write_column(const supine_prepared *prepared, const request
     supine_csv_add(&row, "%zu,%.9g,%.9g,%.9g,%.17g", i, p[0], p[1], p[2], column[i]);
     supine_csv_end_row(&row);
   }
-  supine_options_add(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
-                               "vertex", (json_int_t)wanted->vertex, "vertices", (json_int_t)n));
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
+                              "vertex", (json_int_t)wanted->vertex, "vertices", (json_int_t)n));
   return supine_output_commit(&output, error);
 }
 
@@ -213,7 +213,7 @@ static supine_status write_solution(const supine_prepared *prepared, const reque
   print_gains(lungs, gains);
   supine_options_line(", largest displacement %s mm, %+.2f mL\n",
                       supine_text_distance(largest).text, volume - full);
-  supine_options_add(json_pack(
+  SUPINE_ADD_RESULT(json_pack(
       "{s:o, s:o, s:o, s:f, s:f, s:f}", "file", supine_options_json_text(wanted->path), "gravity",
       supine_options_json_numbers(3, g), "gains", list_gains(lungs, gains),
       "largest_displacement_mm", largest, "volume_ml", volume, "volume_change_ml", volume - full));

@@ -49,6 +49,6 @@ supine_status supine_command_iterate(const supine_lungs *lungs, const supine_mod
   }
   supine_options_line("Pitcher/Catcher: largest difference from the direct solution %.2g\n",
                       difference);
-  supine_options_add(json_pack("{s:f}", "pitcher_catcher_difference", difference));
+  SUPINE_ADD_RESULT(json_pack("{s:f}", "pitcher_catcher_difference", difference));
   return SUPINE_OK;
 }

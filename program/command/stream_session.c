@@ -26,7 +26,7 @@ static bool stop(void *context) {
 /* Add what --json prints of the messages and the latencies. */
 static void add_counts(const supine_stream_results *results) {
   const supine_stream_counts *n = &results->counts;
-  supine_options_add(json_pack(
+  SUPINE_ADD_RESULT(json_pack(
       "{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I}", "positions",
       (json_int_t)n->positions, "poses", (json_int_t)n->poses, "repaired", (json_int_t)n->repaired,
       "refused", (json_int_t)n->refused, "invalid", (json_int_t)n->invalid, "frames",
@@ -36,10 +36,10 @@ static void add_counts(const supine_stream_results *results) {
       "volumes_refused", (json_int_t)n->unreachable));
   for (int surfaces = 0; surfaces < 2; ++surfaces) {
     const supine_stream_latency *latency = &results->latency[surfaces];
-    supine_options_add(json_pack("{s:{s:I, s:I, s:f}}",
-                                 surfaces != 0 ? "surface_latency" : "weights_latency", "frames",
-                                 (json_int_t)latency->count, "late", (json_int_t)latency->late,
-                                 "worst_ms", 1e3 * latency->worst));
+    SUPINE_ADD_RESULT(json_pack("{s:{s:I, s:I, s:f}}",
+                                surfaces != 0 ? "surface_latency" : "weights_latency", "frames",
+                                (json_int_t)latency->count, "late", (json_int_t)latency->late,
+                                "worst_ms", 1e3 * latency->worst));
   }
 }
 
@@ -181,7 +181,7 @@ static supine_status open_page(const supine_stream_session *wanted, const supine
   const bool ipv6 = strchr(address.host, ':') != NULL;
   supine_options_line("page at http%s://%s%s%s:%d/\n", site.certificate != NULL ? "s" : "",
                       ipv6 ? "[" : "", address.host, ipv6 ? "]" : "", site.port);
-  supine_options_add(json_pack("{s:i}", "page_port", (int)site.port));
+  SUPINE_ADD_RESULT(json_pack("{s:i}", "page_port", (int)site.port));
   return SUPINE_OK;
 }
 
@@ -245,7 +245,7 @@ supine_status supine_command_stream_run(const supine_stream_session *wanted,
   supine_options_signals_catch(true); /* before the line from which others know that it runs */
   if (results->port != 0) {
     supine_options_line("listening on port %d\n", results->port);
-    supine_options_add(json_pack("{s:i}", "port", (int)results->port));
+    SUPINE_ADD_RESULT(json_pack("{s:i}", "port", (int)results->port));
   }
   supine_options_print_results(
       true); /* others wait for this; the counts follow in a second object */

@@ -53,8 +53,8 @@ int supine_options_finish(const char *command);
  * reports failed writes. */
 void supine_options_print(json_t *value);
 
-/* Print a list of objects, which hold the same numbers, to standard output, and release it: as CSV of
- * `digits` significant digits, or with --json as it is. */
+/* Print a list of objects, which hold the same numbers, to standard output, and release it: as CSV
+ * of `digits` significant digits, or with --json as it is. */
 void supine_options_print_rows(json_t *rows, int digits);
 
 /* Print text to standard output, unless --json is given. */
@@ -62,6 +62,10 @@ void supine_options_line(const char *format, ...) SUPINE_PRINTF(1, 2);
 /* Add members to the object that --json prints at the end of the command, and release `members`.
  * The same are printed as text by supine_options_line. */
 void supine_options_add(json_t *members);
+/* Make and add members with --json only: outputs are written by then, and without --json no memory
+ * that could be refused is needed any more. */
+#define SUPINE_ADD_RESULT(members)                                                                 \
+  (supine_options_as_json() ? supine_options_add(members) : (void)0)
 /* Begin another object: the command has several results of a kind, and --json prints a list. */
 void supine_options_next_result(void);
 /* Print what was added if --json and `succeeded` are true, and release it. */

@@ -284,8 +284,8 @@ static void print_map(const char *path, const supine_source *source) {
   }
 }
 
-/* Add what --json prints of the label map: its labels, and each lung. */
-static void add_map(const supine_labels_report *report) {
+/* Return what --json prints of the label map: its labels, and each lung. */
+static json_t *list_map(const supine_labels_report *report) {
   json_t *lungs = json_array();
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
@@ -295,8 +295,8 @@ static void add_map(const supine_labels_report *report) {
                                                  "dropped_ml", lung->dropped, "filled_ml",
                                                  lung->filled, "surface_ml", lung->surface));
   }
-  supine_options_add(json_pack("{s:{s:s, s:s, s:o}}", "label_map", "labels", report->taken, "axes",
-                               report->axes, "lungs", lungs));
+  return json_pack("{s:{s:s, s:s, s:o}}", "label_map", "labels", report->taken, "axes",
+                   report->axes, "lungs", lungs);
 }
 
 static int show_progress(void *progress, double fraction) {
@@ -333,7 +333,7 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
   options->context = NULL;
   if (prepared->source.is_map) {
     print_map(given->operand[0], &prepared->source);
-    add_map(&prepared->source.report);
+    SUPINE_ADD_RESULT(list_map(&prepared->source.report));
   }
   supine_options_say_findings(command, &prepared->source.findings);
   return status;

@@ -422,6 +422,9 @@ void supine_options_line(const char *format, ...) {
 }
 
 void supine_options_next_result(void) {
+  if (!supine_options_as_json()) {
+    return;
+  }
   if (results == NULL) {
     results = json_array();
   }
