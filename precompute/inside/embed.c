@@ -595,7 +595,9 @@ static supine_status write_content(const embedding *e, const char *path, supine_
         (supine_tensor){"names", SUPINE_U8, 1, {strlen(content->names)}, content->names};
     tensors[count++] = (supine_tensor){"anatomy", SUPINE_U8, 1, {content->part_count}, e->anatomy};
   }
-  if (supine_inside_hilum(e->shells->basis, e->hilum)) {
+  bool has_hilum;
+  SUPINE_TRY(supine_inside_hilum(e->shells->basis, e->hilum, &has_hilum, error));
+  if (has_hilum) {
     tensors[count++] = (supine_tensor){
         "lungs_hilum", SUPINE_F64, 3, {e->shells->count, 3, e->columns / 3}, e->hilum};
   }

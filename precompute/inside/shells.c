@@ -280,7 +280,8 @@ static bool average_marked(const supine_basis *basis, const bool *marked, double
   return found;
 }
 
-bool supine_inside_hilum(const supine_basis *basis, double *mean) {
+supine_status supine_inside_hilum(const supine_basis *basis, double *mean, bool *known,
+                                  supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const supine_tensor *stored = supine_basis_tensor(basis, "lungs_hilum");
   const size_t columns = 3 * info->mode_count;
@@ -288,17 +289,20 @@ bool supine_inside_hilum(const supine_basis *basis, double *mean) {
   if (stored != NULL && stored->dtype == SUPINE_F64 && stored->rank == 3 &&
       stored->shape[0] == info->lung_count && stored->shape[1] * stored->shape[2] == columns) {
     memcpy(mean, stored->data, info->lung_count * columns * sizeof *mean);
-    return true;
+    *known = true;
+    return SUPINE_OK;
   }
+  *known = false;
   SUPINE_ARENA arena = {0};
   supine_pose scan;
   float *x = supine_arena_take(&arena, 3 * info->vertex_count, sizeof *x);
   bool *marked = supine_arena_take(&arena, info->vertex_count, sizeof *marked);
-  if (arena.failed || supine_basis_metadata(basis, "content") != NULL ||
-      supine_basis_scan_pose(basis, &scan, NULL) != SUPINE_OK ||
-      supine_deform(basis, &scan, x) != SUPINE_OK) {
-    return false;
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", info->vertex_count));
+  if (supine_basis_metadata(basis, "content") == NULL &&
+      supine_basis_scan_pose(basis, &scan, NULL) == SUPINE_OK &&
+      supine_deform(basis, &scan, x) == SUPINE_OK) {
+    mark_hila(info, x, marked);
+    *known = average_marked(basis, marked, mean);
   }
-  mark_hila(info, x, marked);
-  return average_marked(basis, marked, mean);
+  return SUPINE_OK;
 }

@@ -77,8 +77,10 @@ void supine_inside_shells_reading(const supine_inside_shells *shells,
 
 /** Compute the mean displacement of the hila by each mode at weight and gain 1. The hilum is that
  * of supine_lungs_is_hilar.
- * @param mean  [lungs, 3, modes] written, mm; from the file, if it holds structures inside lungs
- * @return whether the file determines it */
-bool supine_inside_hilum(const supine_basis *basis, double *mean);
+ * @param mean   [lungs, 3, modes] written, mm; from the file, if it holds structures inside lungs
+ * @param known  whether the file determines it, written
+ * Return an error only if memory is refused. */
+supine_status supine_inside_hilum(const supine_basis *basis, double *mean, bool *known,
+                                  supine_error *error);
 
 #endif

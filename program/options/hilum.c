@@ -19,7 +19,9 @@ static supine_status prepare(const supine_basis *basis, const supine_state *stat
   double *mean = supine_arena_take(&arena, info->lung_count * 3 * info->mode_count, sizeof *mean);
   *model = (supine_expected_model){.basis = basis};
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu modes", info->mode_count));
-  if (!supine_inside_hilum(basis, mean)) {
+  bool known;
+  SUPINE_TRY(supine_inside_hilum(basis, mean, &known, error));
+  if (!known) {
     SUPINE_REFUSE_IF(needed, error, SUPINE_ERROR_UNSUPPORTED,
                      "--frame hilum: the file does not say how the hilum moves: make it again with "
                      "'supine embed'");

@@ -81,8 +81,8 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   (void)supine_compare_distances(c->compare, &posture->pose, &c->reference.pose, distance);
   supine_compare_statistics(c->compare, distance, &posture->displacement);
   (void)supine_basis_volumes(c->basis, &posture->pose, posture->volume);
-  (void)supine_options_hilum(c->basis, &item->state, &c->reference.state, false, &posture->hilum,
-                             NULL);
+  SUPINE_TRY(supine_options_hilum(c->basis, &item->state, &c->reference.state, false,
+                                  &posture->hilum, error));
   if (c->breath > 0.0) {
     status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
