@@ -97,15 +97,20 @@ json_t *supine_report_line(const supine_comparison *comparison, size_t posture);
 json_t *supine_report_findings(const supine_comparison *comparison);
 json_t *supine_report_postures(const supine_comparison *comparison);
 json_t *supine_report_profile(const supine_comparison *comparison);
-json_t *supine_report_outlines(const supine_comparison *comparison);
 json_t *supine_report_footnotes(const supine_comparison *comparison);
 
 /* Return the tables with a row for each target, or for each structure that is anatomy, and a column
  * for each posture but the reference; NULL if there are no rows or no columns. */
 json_t *supine_report_matrix(const supine_comparison *comparison, bool anatomy);
 
-/* Return the outlines in three planes through each target; NULL if there are no targets. */
-json_t *supine_report_target_outlines(const supine_comparison *comparison);
+/* Draw the outlines in slices of the lungs. Return an error only if memory is refused. */
+supine_status supine_report_outlines(const supine_comparison *comparison, json_t **made,
+                                     supine_error *error);
+
+/* Draw the outlines in three planes through each target, or set `made` to NULL if there are no
+ * targets. Return an error only if memory is refused. */
+supine_status supine_report_target_outlines(const supine_comparison *comparison, json_t **made,
+                                            supine_error *error);
 
 /* Return the value of the tag {{pictures}}. If pictures cannot be drawn, set `error` and return
  * NULL. */

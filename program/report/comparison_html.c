@@ -74,28 +74,38 @@ static json_t *matrix(const supine_comparison *c, bool anatomy, const char *labe
   return made;
 }
 
-/* Return the outlines through targets, with the names and colours of those drawn, or NULL. */
-static json_t *traces(const supine_comparison *c) {
-  json_t *made = c->inside != NULL ? supine_report_target_outlines(c) : NULL;
-  if (made != NULL) {
-    const json_t *first = json_array_get(json_object_get(made, "traced"), 0);
-    const json_t *chart = json_array_get(json_object_get(first, "outlines"), 0);
-    (void)json_object_set(made, "drawn", json_object_get(chart, "lines"));
+/* Draw the outlines through targets, with the names and colours of those drawn; NULL if there are
+ * none. */
+static supine_status draw_traces(const supine_comparison *c, json_t **made, supine_error *error) {
+  *made = NULL;
+  if (c->inside != NULL) {
+    SUPINE_TRY(supine_report_target_outlines(c, made, error));
   }
-  return made;
+  if (*made != NULL) {
+    const json_t *first = json_array_get(json_object_get(*made, "traced"), 0);
+    const json_t *chart = json_array_get(json_object_get(first, "outlines"), 0);
+    (void)json_object_set(*made, "drawn", json_object_get(chart, "lines"));
+  }
+  return SUPINE_OK;
 }
 
-/* Return the outlines in slices, with the names and colours of those drawn; NULL for a single
+/* Draw the outlines in slices, with the names and colours of those drawn; NULL for a single
  * posture. */
-static json_t *outlined(const supine_comparison *c) {
-  json_t *outlines = c->postures.count > 1 ? supine_report_outlines(c) : NULL;
-  return outlines == NULL ? NULL
-                          : json_pack("{s:o, s:O}", "outlines", outlines, "drawn",
-                                      json_object_get(json_array_get(outlines, 0), "lines"));
+static supine_status draw_slices(const supine_comparison *c, json_t **made, supine_error *error) {
+  json_t *outlines;
+  *made = NULL;
+  if (c->postures.count > 1) {
+    SUPINE_TRY(supine_report_outlines(c, &outlines, error));
+    *made = json_pack("{s:o, s:O}", "outlines", outlines, "drawn",
+                      json_object_get(json_array_get(outlines, 0), "lines"));
+  }
+  return SUPINE_OK;
 }
 
-/* Return the values of the tags of report.html but {{pictures}} and {{trouble}}. */
-static json_t *values(const supine_comparison *c) {
+/* Return the values of the tags of report.html but {{pictures}} and {{trouble}}.
+ * @param traced  outlines through targets; NULL if there are none
+ * @param sliced  outlines in slices; NULL if they are not shown */
+static json_t *values(const supine_comparison *c, json_t *traced, json_t *sliced) {
   SUPINE_C_LOCALE;
   char title[256];
   char volume[160];
@@ -110,7 +120,6 @@ static json_t *values(const supine_comparison *c) {
   json_t *heading = json_string(title);
   supine_report_volume(c, volume, sizeof volume);
   json_t *today = date();
-  json_t *traced = traces(c);
   return json_pack(
       "{s:o, s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, "
       "s:s*, "
@@ -124,12 +133,18 @@ static json_t *values(const supine_comparison *c) {
       "targets", matrix(c, false, "target, mm"), "traces", traced, "lobes",
       matrix(c, true, "structure"), "meaning",
       c->has_errors ? SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT : NULL, "caveats",
-      caveats, "outlined", traced == NULL ? outlined(c) : NULL, "ventilation",
+      caveats, "outlined", sliced, "ventilation",
       c->breath > 0.0 ? json_pack("{s:o}", "profile", supine_report_profile(c)) : NULL);
 }
 
 supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_error *error) {
-  json_auto_t *data = values(c);
+  json_t *traced;
+  json_t *sliced = NULL;
+  SUPINE_TRY(draw_traces(c, &traced, error));
+  if (traced == NULL) {
+    SUPINE_TRY(draw_slices(c, &sliced, error));
+  }
+  json_auto_t *data = values(c, traced, sliced);
   json_t *pictures = supine_report_pictures(c, error);
   if (pictures == NULL && error->status == SUPINE_ERROR_MEMORY) {
     return error->status;

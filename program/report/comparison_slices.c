@@ -50,6 +50,8 @@ typedef struct shapes {
   float *before; /* [N, 3] mm */
   float **now;   /* [postures.count][N, 3] mm */
   crossing *met; /* [triangles] memory of trace */
+  double *area;  /* [postures.count] inside the outlines of a chart, mm^2 */
+  bool failed;   /* whether memory for an outline was refused */
   double low[3]; /* box of the lungs in all postures, mm */
   double high[3];
   supine_arena arena;
@@ -59,20 +61,19 @@ static void free_shapes(shapes *s) {
   supine_arena_free(&s->arena);
 }
 
-/* Compute the positions of all vertices. Return false if memory has run out. */
-static bool find_shapes(const supine_comparison *c, shapes *s) {
+/* Compute the positions of all vertices. */
+static supine_status find_shapes(const supine_comparison *c, shapes *s, supine_error *error) {
   s->c = c;
   s->info = supine_basis_get_info(c->basis);
   const size_t n = s->info->vertex_count;
   s->now = supine_arena_zeros(&s->arena, c->postures.count, sizeof *s->now);
   s->met = supine_arena_take(&s->arena, s->info->triangle_count, sizeof *s->met);
   s->before = supine_arena_take(&s->arena, n, 3 * sizeof *s->before);
+  s->area = supine_arena_zeros(&s->arena, c->postures.count, sizeof *s->area);
   for (size_t i = 0; i < c->postures.count && !s->arena.failed; ++i) {
     s->now[i] = supine_arena_take(&s->arena, n, 3 * sizeof *s->now[i]);
   }
-  if (s->arena.failed) {
-    return false;
-  }
+  SUPINE_TRY(supine_arena_check(&s->arena, error, "outlines of %zu vertices", n));
   for (size_t axis = 0; axis < 3; ++axis) {
     s->low[axis] = INFINITY;
     s->high[axis] = -INFINITY;
@@ -82,7 +83,7 @@ static bool find_shapes(const supine_comparison *c, shapes *s) {
     (void)supine_deform(c->basis, &c->posture[i].pose, s->now[i]);
     supine_render_box(s->now[i], n, s->low, s->high);
   }
-  return true;
+  return SUPINE_OK;
 }
 
 /* Convert a point, mm, to coordinates of the picture. */
@@ -159,16 +160,18 @@ static double trace(const supine_basis_info *info, const slice *s, double at, co
 }
 
 /* Return the outline of positions as an SVG path; set `area` to the area inside, mm^2. */
-static json_t *outline(const shapes *of, const slice *s, double at, const float *xyz,
-                       double *area) {
+static json_t *outline(shapes *of, const slice *s, double at, const float *xyz, double *area) {
   char *text = NULL;
   size_t size = 0;
   FILE *path = open_memstream(&text, &size);
   if (path == NULL) {
+    of->failed = true;
     return json_string("");
   }
   *area = trace(of->info, s, at, xyz, of->met, path);
-  json_t *made = fclose(path) == 0 ? json_string(text) : json_string("");
+  const bool whole = fclose(path) == 0;
+  of->failed = of->failed || !whole;
+  json_t *made = json_string(whole ? text : "");
   free(text);
   return made;
 }
@@ -181,7 +184,7 @@ static json_t *letter(double x, double y, char name) {
 
 /* Return the chart of a slice at the coordinate `at`, mm, without a title: outlines in the
  * reference and in each posture, letters at the ends, and a bar of 5 cm. */
-static json_t *chart(const shapes *of, const slice *s, double at, double *before, double *area) {
+static json_t *chart(shapes *of, const slice *s, double at, double *before) {
   SUPINE_C_LOCALE;
   enum { MARGIN = 18, SCALE_BAR = 50 }; /* mm */
   const double left = of->low[s->across];
@@ -193,7 +196,7 @@ static json_t *chart(const shapes *of, const slice *s, double at, double *before
   for (size_t i = 0; i < of->c->postures.count; ++i) {
     if (!supine_report_is_reference(of->c, i)) {
       json_t *line = supine_report_line(of->c, i);
-      (void)json_object_set_new(line, "path", outline(of, s, at, of->now[i], &area[i]));
+      (void)json_object_set_new(line, "path", outline(of, s, at, of->now[i], &of->area[i]));
       (void)json_array_append_new(lines, line);
     }
   }
@@ -247,26 +250,31 @@ static void set_widths(json_t *charts) {
   }
 }
 
-json_t *supine_report_outlines(const supine_comparison *c) {
+/* Hand over `list`, unless memory for one of its outlines was refused. */
+static supine_status finish(const shapes *of, json_t *list, json_t **made, supine_error *error) {
+  if (of->failed) {
+    json_decref(list);
+    return supine_error_memory(error, "outlines of %zu vertices", of->info->vertex_count);
+  }
+  *made = list;
+  return SUPINE_OK;
+}
+
+supine_status supine_report_outlines(const supine_comparison *c, json_t **made,
+                                     supine_error *error) {
   SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
+  SUPINE_TRY(find_shapes(c, &of, error));
   json_t *list = json_array();
-  if (!find_shapes(c, &of)) {
-    return list;
-  }
-  double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
-  if (area == NULL) {
-    return list;
-  }
   for (size_t i = 0; i < sizeof slices / sizeof *slices; ++i) {
     const slice *s = &slices[i];
     double before = 0.0;
     const double at = of.low[s->axis] + s->share * (of.high[s->axis] - of.low[s->axis]);
-    json_t *made = chart(&of, s, at, &before, area);
-    (void)json_object_set_new(made, "title", area_title(c, s, before, area));
-    (void)json_array_append_new(list, made);
+    json_t *drawn = chart(&of, s, at, &before);
+    (void)json_object_set_new(drawn, "title", area_title(c, s, before, of.area));
+    (void)json_array_append_new(list, drawn);
   }
   set_widths(list);
-  return list;
+  return finish(&of, list, made, error);
 }
 
 /* Add to the chart of a plane where target `k` was, and for each posture a dot where it is and a
@@ -300,7 +308,7 @@ static void add_target(const supine_comparison *c, const slice *s, size_t k, con
 }
 
 /* Return the charts of the planes through the place where target `k` was. */
-static json_t *target_charts(const shapes *of, size_t k, double *area) {
+static json_t *target_charts(shapes *of, size_t k) {
   const supine_target *t = &of->c->posture[0].targets[k];
   json_t *charts = json_array();
   double was[3];
@@ -309,7 +317,7 @@ static json_t *target_charts(const shapes *of, size_t k, double *area) {
   }
   for (size_t i = 0; i < sizeof planes / sizeof *planes; ++i) {
     double before = 0.0;
-    json_t *made = chart(of, &planes[i], was[planes[i].axis], &before, area);
+    json_t *made = chart(of, &planes[i], was[planes[i].axis], &before);
     add_target(of->c, &planes[i], k, was, made);
     (void)json_array_append_new(charts, made);
   }
@@ -317,33 +325,29 @@ static json_t *target_charts(const shapes *of, size_t k, double *area) {
   return json_pack("{s:s, s:o}", "name", of->c->names.text[k], "outlines", charts);
 }
 
-json_t *supine_report_target_outlines(const supine_comparison *c) {
+supine_status supine_report_target_outlines(const supine_comparison *c, json_t **made,
+                                            supine_error *error) {
   SUPINE_C_LOCALE;
   SUPINE_FREED_BY(free_shapes) shapes of = {.c = c};
   size_t left_out = 0;
-  if (!find_shapes(c, &of)) {
-    return NULL;
-  }
-  double *area = supine_arena_zeros(&of.arena, c->postures.count, sizeof *area);
-  if (area == NULL) {
-    return NULL;
-  }
+  *made = NULL;
+  SUPINE_TRY(find_shapes(c, &of, error));
   json_t *list = json_array();
   for (size_t k = 0; k < c->names.count; ++k) {
     const bool drawn =
         !c->posture[0].targets[k].anatomy && c->names.begin[k + 1] > c->names.begin[k];
     if (drawn && json_array_size(list) < TARGETS_MAX) {
-      (void)json_array_append_new(list, target_charts(&of, k, area));
+      (void)json_array_append_new(list, target_charts(&of, k));
     } else if (drawn) {
       ++left_out;
     }
   }
   if (json_array_size(list) == 0) {
     json_decref(list);
-    return NULL;
+    return SUPINE_OK;
   }
-  return json_pack("{s:o, s:o*}", "traced", list, "left_out",
-                   left_out > 0 ? json_sprintf("%zu further target%s not drawn.", left_out,
-                                               left_out == 1 ? " is" : "s are")
-                                : NULL);
+  json_t *left = left_out > 0 ? json_sprintf("%zu further target%s not drawn.", left_out,
+                                             left_out == 1 ? " is" : "s are")
+                              : NULL;
+  return finish(&of, json_pack("{s:o, s:o*}", "traced", list, "left_out", left), made, error);
 }
