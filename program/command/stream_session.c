@@ -8,6 +8,7 @@
 #include "program/command/stream_session.h"
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
+#include "program/options/surface_options.h"
 #include "program/stream/peer.h"
 #include "program/view/export/export.h"
 
@@ -206,7 +207,10 @@ static supine_status set_volume(const supine_basis *basis, const supine_stream_s
     }
     SUPINE_TRY(supine_stream_volume_breathe(volume, &pv, &wanted->breath, error));
   }
-  return supine_stream_volume_judge(volume, basis, supine, error);
+  supine_findings findings = {.count = 0};
+  const supine_status status = supine_stream_volume_judge(volume, basis, supine, &findings, error);
+  supine_options_say_findings(name, &findings);
+  return status;
 }
 
 /* What a run needs besides the basis. */

@@ -22,11 +22,20 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
   return SUPINE_OK;
 }
 
+static supine_status judge_state(const supine_basis *basis, const supine_state *state,
+                                 supine_findings *findings, supine_error *error) {
+  supine_pose pose;
+  SUPINE_TRY(supine_basis_pose(basis, state, &pose, error));
+  if (findings != NULL) {
+    supine_basis_tell(basis, state, &pose, findings);
+  }
+  return SUPINE_OK;
+}
+
 supine_status supine_stream_volume_judge(const supine_stream_volume *volume,
                                          const supine_basis *basis, const double gravity[3],
-                                         supine_error *error) {
+                                         supine_findings *findings, supine_error *error) {
   const supine_state *fixed = &volume->fixed;
-  supine_pose pose;
   SUPINE_REFUSE_IF(!volume->breathes && supine_basis_get_info(basis)->hilum != NULL &&
                        fixed->lung_count == 0 && fixed->volume.kind == SUPINE_VOLUME_SCAN &&
                        fixed->volume.ml == 0.0,
@@ -35,12 +44,12 @@ supine_status supine_stream_volume_judge(const supine_stream_volume *volume,
   if (volume->breathes) {
     const supine_state rest = supine_options_breath_state(basis, gravity, 0.0);
     const supine_state full = supine_options_breath_state(basis, gravity, volume->breath.tidal);
-    SUPINE_TRY(supine_basis_pose(basis, &rest, &pose, error));
-    return supine_basis_pose(basis, &full, &pose, error);
+    SUPINE_TRY(judge_state(basis, &rest, findings, error));
+    return judge_state(basis, &full, findings, error);
   }
   supine_state state = *fixed;
   memcpy(state.gravity, gravity, sizeof state.gravity);
-  return supine_basis_pose(basis, &state, &pose, error);
+  return judge_state(basis, &state, findings, error);
 }
 
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,
@@ -96,17 +105,25 @@ static void note_pose(supine_stream_patient *p, double received, uint64_t stamp)
   p->stamp = stamp;
 }
 
+static void warn_of(supine_stream_patient *p, const supine_findings *findings, double received) {
+  for (size_t i = 0; i < findings->count; ++i) {
+    supine_stream_patient_warn(p, received, "warning: %s", findings->list[i].text);
+  }
+}
+
 /* Store a pose, unless `verdict` refuses it or the lungs cannot hold their volume in it. Warn if
  * the pose is repaired. */
 static supine_status accept_pose(supine_stream_patient *p, supine_stream_verdict verdict,
                                  const char *why, const double gravity[3], double received,
                                  uint64_t stamp, supine_error *error) {
+  supine_findings findings = {.count = 0};
   supine_error wrong;
   if (verdict == SUPINE_STREAM_REFUSED) {
     ++p->counts->refused;
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "a pose is refused: %s", why);
   }
-  if (supine_stream_volume_judge(p->options->volume, p->basis, gravity, &wrong) != SUPINE_OK) {
+  if (supine_stream_volume_judge(p->options->volume, p->basis, gravity, &findings, &wrong) !=
+      SUPINE_OK) {
     ++p->counts->refused;
     return supine_error_wrap(error, &wrong, "a pose is refused: ");
   }
@@ -114,6 +131,7 @@ static supine_status accept_pose(supine_stream_patient *p, supine_stream_verdict
     ++p->counts->repaired;
     supine_stream_patient_warn(p, received, "a pose is repaired: %s; send a rotation", why);
   }
+  warn_of(p, &findings, received);
   memcpy(p->gravity, gravity, sizeof p->gravity);
   note_pose(p, received, stamp);
   ++p->counts->poses;
@@ -124,11 +142,13 @@ static supine_status accept_pose(supine_stream_patient *p, supine_stream_verdict
 static supine_status accept_volume(supine_stream_patient *p, const supine_state *fixed,
                                    double received, supine_error *error) {
   const supine_stream_volume volume = {.fixed = *fixed};
+  supine_findings findings = {.count = 0};
   supine_error wrong;
-  if (supine_stream_volume_judge(&volume, p->basis, p->gravity, &wrong) != SUPINE_OK) {
+  if (supine_stream_volume_judge(&volume, p->basis, p->gravity, &findings, &wrong) != SUPINE_OK) {
     ++p->counts->unreachable;
     return supine_error_wrap(error, &wrong, "a volume is refused: ");
   }
+  warn_of(p, &findings, received);
   *p->options->volume = volume;
   note_message(p, received);
   return SUPINE_OK;

@@ -20,12 +20,13 @@ supine_status supine_stream_volume_breathe(supine_stream_volume *volume, const s
                                            const supine_pv_breath *breath, supine_error *error);
 
 /** Check that the lungs can hold a fixed volume or, at both ends, a breath.
- * @param gravity  [3] direction of gravity
+ * @param gravity   [3] direction of gravity
+ * @param findings  told of a volume that they cannot hold, if the basis allows it; or NULL
  * @return the status of supine_basis_pose; SUPINE_ERROR_UNSUPPORTED for the scan of a lung that has
  *         collapsed since */
 supine_status supine_stream_volume_judge(const supine_stream_volume *volume,
                                          const supine_basis *basis, const double gravity[3],
-                                         supine_error *error);
+                                         supine_findings *findings, supine_error *error);
 
 /** Return the state for the unit vector `gravity`, `time` seconds after the breath begins. */
 supine_state supine_stream_volume_at(const supine_stream_volume *volume, const supine_basis *basis,

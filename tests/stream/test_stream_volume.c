@@ -22,12 +22,12 @@ TEST(test_volume_judge_and_breath_equal_library) {
   supine_stream_volume *volume = fixture_allocate(1, sizeof *volume);
   const double gravity[3] = {0, 1, 0};
   *volume = (supine_stream_volume){.fixed = {.volume = {SUPINE_VOLUME_SCAN, 40.0}}};
-  assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, &error), SUPINE_OK);
+  assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, NULL, &error), SUPINE_OK);
   expect_volume(volume, basis, gravity, 1.0, (supine_volume){SUPINE_VOLUME_SCAN, 40.0});
   static const double wrong[] = {NAN, INFINITY, -1e300};
   for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i) {
     volume->fixed.volume.ml = wrong[i];
-    assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, &error),
+    assert_int_equal(supine_stream_volume_judge(volume, basis, gravity, NULL, &error),
                      SUPINE_ERROR_ARGUMENT);
   }
   /* The volume follows the breathing model, within a thousandth of the tidal volume. */
