@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Build sentences from parts, and compare endings of names. */
+/* Build sentences from parts, compare endings of names, and decode base64. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -81,4 +81,31 @@ supine_distance_text supine_text_distance(double mm) {
     (void)supine_print_text(distance.text, sizeof distance.text, "%.3f", mm);
   }
   return distance;
+}
+
+size_t supine_text_decode_base64(const char *at, const char *end, unsigned char *bytes) {
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  unsigned char *to = bytes;
+  unsigned word = 0;
+  int got = 0;
+  int padding = 0;
+  for (; at < end; ++at) {
+    const char *digit = memchr(digits, *at, 64);
+    if (supine_ascii_is_space(*at)) {
+      continue;
+    }
+    if (digit == NULL && *at != '=') {
+      break;
+    }
+    word = word << 6 | (digit != NULL ? (unsigned)(digit - digits) : 0U);
+    padding += *at == '=';
+    if (++got == 4) {
+      for (int k = 0; k < 3 - padding; ++k) {
+        *to++ = (unsigned char)(word >> (16 - 8 * k));
+      }
+      word = 0;
+      got = padding = 0;
+    }
+  }
+  return (size_t)(to - bytes);
 }

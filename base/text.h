@@ -48,4 +48,10 @@ typedef struct supine_distance_text {
 /** Format a distance in mm: with three decimals, or as "below 0.002". */
 supine_distance_text supine_text_distance(double mm);
 
+/** Decode base64 (RFC 4648) from `at` up to `end`, or to the first character that is neither base64
+ * nor white space. Several streams may follow each other, each padded to groups of four characters.
+ * @param bytes  output: room for 3 bytes for each 4 characters
+ * @return the number of bytes decoded */
+size_t supine_text_decode_base64(const char *at, const char *end, unsigned char *bytes);
+
 #endif

@@ -136,29 +136,6 @@ static supine_status check_class(const segmentation *s) {
   return SUPINE_OK;
 }
 
-/* Decode base64 (RFC 4648) without line ends. Return the number of bytes, 0 if it is invalid. */
-static size_t decode(const char *from, size_t length, unsigned char *to) {
-  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  signed char value[256];
-  size_t bytes = 0;
-  uint32_t bits = 0;
-  memset(value, -1, sizeof value);
-  for (int i = 0; i < 64; ++i) {
-    value[(unsigned char)digits[i]] = (signed char)i;
-  }
-  for (size_t i = 0; i < length && from[i] != '='; ++i) {
-    const signed char digit = value[(unsigned char)from[i]];
-    if (digit < 0) {
-      return 0;
-    }
-    bits = bits << 6 | (unsigned char)digit;
-    if (i % 4 > 0) {
-      to[bytes++] = (unsigned char)(bits >> (6 - 2 * (i % 4)));
-    }
-  }
-  return bytes;
-}
-
 /* Read the numbers of the voxels, and check that there are enough of them. */
 static supine_status read_pixels(segmentation *s) {
   const json_t *binary = json_object_get(json_object_get(s->root, PIXELS), "InlineBinary");
@@ -173,7 +150,7 @@ static supine_status read_pixels(segmentation *s) {
   if (s->pixels == NULL) {
     return supine_error_memory(s->error, "%zu bytes of %s", length, s->path);
   }
-  s->size = decode(code, length, s->pixels);
+  s->size = supine_text_decode_base64(code, code + length, s->pixels);
   SUPINE_REFUSE_IF(
       !(voxels >= 1.0) || (s->fractional ? voxels : voxels / 8.0) > (double)s->size, s->error,
       SUPINE_ERROR_FORMAT,

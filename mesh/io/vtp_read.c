@@ -9,6 +9,7 @@
 
 #include "base/arena.h"
 #include "base/ascii.h"
+#include "base/text.h"
 
 #include "mesh/io/read.h"
 
@@ -71,36 +72,6 @@ static uint64_t little(const unsigned char *bytes, size_t size) {
     value = value << 8 | bytes[i];
   }
   return value;
-}
-
-/* Decode base64 up to the first character that is not base64. Several streams may follow each
- * other, each padded to groups of four characters. Return the number of bytes decoded.
- * @param bytes  output: room for 3 bytes for each 4 characters */
-static size_t base64(const char *at, const char *end, unsigned char *bytes) {
-  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  unsigned char *to = bytes;
-  unsigned word = 0;
-  int got = 0;
-  int padding = 0;
-  for (; at < end; ++at) {
-    const char *digit = memchr(digits, *at, 64);
-    if (supine_ascii_is_space(*at)) {
-      continue;
-    }
-    if (digit == NULL && *at != '=') {
-      break;
-    }
-    word = word << 6 | (digit != NULL ? (unsigned)(digit - digits) : 0U);
-    padding += *at == '=';
-    if (++got == 4) {
-      for (int k = 0; k < 3 - padding; ++k) {
-        *to++ = (unsigned char)(word >> (16 - 8 * k));
-      }
-      word = 0;
-      got = padding = 0;
-    }
-  }
-  return (size_t)(to - bytes);
 }
 
 /* Unpack the bytes of an array into out [wanted]. An array that is not compressed holds its size in
@@ -166,7 +137,8 @@ static bool take_bytes(const vtp_file *v, const element *e, size_t wanted, unsig
   }
   SUPINE_ARENA arena = {0};
   unsigned char *decoded = supine_arena_take(&arena, (size_t)(v->end - at) / 4 * 3 + 1, 1);
-  return decoded != NULL && unpack(v, decoded, base64(at, v->end, decoded), wanted, out);
+  return decoded != NULL &&
+         unpack(v, decoded, supine_text_decode_base64(at, v->end, decoded), wanted, out);
 }
 
 /* Free an array of numbers; for SUPINE_FREED_BY. */
