@@ -21,11 +21,12 @@ and nibabel (Debian: python3-nibabel)."""
 import argparse
 import csv
 import os
-import subprocess
 import sys
 import tempfile
 from itertools import product
 from pathlib import Path
+
+from whole import check_new, new_folder, run
 
 try:
     import nibabel
@@ -84,19 +85,15 @@ def rows_of(path, dose):
 
 
 def deform(wanted, *options):
-    program = os.environ.get("SUPINE", "supine")
-    done = subprocess.run([program, "deform", wanted.grid, "--image", wanted.ct, *options], check=False,
-                          stdout=subprocess.DEVNULL)
-    if done.returncode != 0:
-        sys.exit(done.returncode)
+    run(os.environ.get("SUPINE", "supine"), "deform", wanted.grid, "--image", wanted.ct, *options)
 
 
-def move(work, wanted, rows):
+def move(work, wanted, rows, ct):
     """Let the program write CT, aerated tissue and field of each state; return where the lungs are in CT."""
     deform(wanted, "--quiet", "--posture", "supine", "--volume", "scan", "--ventilation", work / "scan.nii.gz")
     values, affine = read(work / "scan.nii.gz")
     lungs = ~np.isnan(values)
-    aerated = lungs & (read(wanted.ct)[0] < AERATED)
+    aerated = lungs & (ct < AERATED)
     nibabel.save(nibabel.Nifti1Image(aerated.astype(np.uint8), affine), work / "aerated.nii.gz")
     columns = ("posture", "volume", "sample")
     with open(work / "states.csv", "w", encoding="utf-8", newline="") as file:
@@ -162,8 +159,8 @@ def add_up(work, rows, lungs, ct, affine):
 
 def fill(folder, wanted, rows):
     with tempfile.TemporaryDirectory(dir=folder.parent) as work:
-        lungs = move(Path(work), wanted, rows)
         ct, affine = read(wanted.ct)
+        lungs = move(Path(work), wanted, rows, ct)
         for name, values in zip(("mean", "spread"), add_up(Path(work), rows, lungs, ct, affine)):
             image = np.full(ct.shape, np.nan, np.float32)
             image[lungs] = values
@@ -181,16 +178,12 @@ def main():
         parser.add_argument(name, type=Path, metavar=name.upper())
     parser.add_argument("--dose", type=Path, help="dose that stays in the room, for rows without one")
     wanted = parser.parse_args()
-    if wanted.folder.exists() or not wanted.folder.absolute().parent.is_dir():
-        sys.exit(f"{wanted.folder}: name a new folder, in one that exists")
+    check_new(wanted.folder)
     if not wanted.states.is_file():
         sys.exit(f"{wanted.states}: no such file: give a list of states")
     rows = rows_of(wanted.states, wanted.dose)
-    with tempfile.TemporaryDirectory(dir=wanted.folder.absolute().parent) as part:
-        folder = Path(part, "dose")
-        folder.mkdir()
+    with new_folder(wanted.folder) as folder:
         fill(folder, wanted, rows)
-        folder.rename(wanted.folder)
 
 
 if __name__ == "__main__":

@@ -16,10 +16,11 @@ import csv
 import hashlib
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from whole import check_new, new_folder, run
 
 try:
     import nibabel
@@ -47,14 +48,6 @@ Each series has its own frame of reference, whose coordinates are those of the s
 study and one patient. series.csv lists them; LICENCE has the terms. What the program printed about each posture:
 
 {printed}"""
-
-
-def run(*words, folder=None):
-    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=folder)
-    sys.stderr.write(done.stderr)
-    if done.returncode != 0:
-        sys.exit(done.returncode)
-    return done.stdout
 
 
 def turned(image, below, into):
@@ -142,20 +135,16 @@ def main():
     parser.add_argument("--volume", default="rest", help="volume of the lungs in all postures (default: rest)")
     parser.add_argument("--patient", default="Synthetic^Lungs", help="name and identifier of the patient in DICOM")
     wanted = parser.parse_args()
-    if wanted.folder.exists() or not wanted.folder.absolute().parent.is_dir():
-        sys.exit(f"{wanted.folder}: name a new folder, in one that exists")
+    check_new(wanted.folder)
     if not wanted.licence.is_file():
         sys.exit(f"{wanted.licence}: no such file; an archive needs the terms under which the CT may be passed on")
     if shutil.which("plastimatch") is None:
         sys.exit("plastimatch is missing, which writes DICOM: apt-get install plastimatch")
-    with tempfile.TemporaryDirectory(dir=wanted.folder.absolute().parent) as part:
-        folder = Path(part, "archive")
-        folder.mkdir()
+    with new_folder(wanted.folder) as folder:
         fill(folder, wanted, os.environ.get("SUPINE", "supine"))
         sums = "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder)}\n"
                        for path in sorted(folder.rglob("*")) if path.is_file())
         (folder / "SHA256SUMS").write_text(sums, encoding="utf-8")
-        folder.rename(wanted.folder)
 
 
 if __name__ == "__main__":

@@ -64,6 +64,7 @@ supine_status supine_warp_ventilation(const supine_field *field, const supine_im
   }
   const float *values = made->values;
   const unsigned char *nearest = field->lung.values;
+  const double size = voxel_volume(made);
   for (size_t i = 0; i < count; ++i) {
     if (!isnan(values[i])) {
       double point[3];
@@ -71,8 +72,8 @@ supine_status supine_warp_ventilation(const supine_field *field, const supine_im
       supine_image_place(made, i, point);
       supine_warp_find_cell(&field->nodes, point, &cell);
       supine_ventilated *lung = &lungs[nearest[nearest_node(&field->lung, &cell)]];
-      lung->held += voxel_volume(made);
-      lung->taken += voxel_volume(made) * (double)values[i];
+      lung->held += size;
+      lung->taken += size * (double)values[i];
     }
   }
   return SUPINE_OK;
@@ -102,6 +103,7 @@ supine_status supine_warp_ventilated_labels(const supine_image *ventilation,
                                             const supine_image *labels, supine_ventilated *parts,
                                             size_t *count, supine_error *error) {
   const float *values = ventilation->values;
+  const double size = voxel_volume(labels);
   *count = 0;
   for (size_t i = 0; i < labels->size[0] * labels->size[1] * labels->size[2]; ++i) {
     const double label = supine_image_get(labels, i);
@@ -110,8 +112,8 @@ supine_status supine_warp_ventilated_labels(const supine_image *ventilation,
       SUPINE_REFUSE_IF(part == NULL, error, SUPINE_ERROR_ARGUMENT,
                        "more than %d labels lie in the lungs: give a map of lobes",
                        SUPINE_VENTILATED_MOST);
-      part->held += voxel_volume(labels);
-      part->taken += voxel_volume(labels) * (double)values[i];
+      part->held += size;
+      part->taken += size * (double)values[i];
     }
   }
   qsort(parts, *count, sizeof *parts, compare_labels);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Write the ventilation of 'supine deform', and print it for lungs and labels. */
+/* Write the image of --ventilation, and print how much air each lung and each label takes in. */
 #include "program/command/deform_ventilation.h"
 
 #include <math.h>
