@@ -8,7 +8,8 @@
 // draws in software unless FLAGs choose a graphics card: --enable-gpu and --use-angle=gl or --use-angle=vulkan.
 // "still" is a frame that draws the surface without deforming it. "turning" is a frame while the patient turns:
 // weights, positions, normals and drawing. "script" is the time of the CPU in such a frame. The ratio of turning to
-// still is the cost of deforming and drawing relative to drawing alone.
+// still is the cost of deforming and drawing relative to drawing alone. "doubting" is a turning frame of plausible
+// lungs, and "sample" the time in which the CPU draws one of them, every 0.4 s at most.
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -48,6 +49,8 @@ const found = await page.evaluate(() => {
     state.settle(state.standing.q, tilt % 60, 0);
     state.compute();
   };
+  const shift = { surface: new Float32Array(3 * basis.vertices).fill(1) };
+  let sampled = 0;
   const passes = {
     weights,
     deform: () => picture.deform('now', state.moment),
@@ -57,6 +60,12 @@ const found = await page.evaluate(() => {
       picture.deform('now', state.moment);
       picture.draw(panes());
     },
+    doubting: () => {
+      weights();
+      picture.deform('now', state.moment, shift);
+      picture.draw(panes());
+    },
+    sample: () => basis.library.sample(++sampled % 20, { anotherDay: true }),
   };
   const times = Object.fromEntries(['script', ...Object.keys(passes)].map((name) => [name, Infinity]));
   const some = 20; // frames per measurement, because the clock of a browser has steps of 0.1 ms
@@ -95,3 +104,4 @@ console.log(found.renderer);
 console.log(`${found.vertices} vertices, ${found.triangles} triangles, ${found.modes} modes; ms:`);
 for (const [name, time] of Object.entries(found.times)) console.log(`  ${name.padEnd(10)} ${time.toFixed(2)}`);
 console.log(`turning / still: ${(found.times.turning / found.times.still).toFixed(2)}`);
+console.log(`doubting / turning: ${(found.times.doubting / found.times.turning).toFixed(2)}`);

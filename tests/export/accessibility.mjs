@@ -49,9 +49,9 @@ for (const [what, width, init, hash] of [
         return kind === 'webgl2' ? null : getContext.call(this, kind, ...rest);
       };
     },
-    '',
+    '#show=doubt',
   ],
-  ['after a wrong link', 320, () => {}, '#posture=pron&depth=9000&prone'],
+  ['after a wrong link', 320, () => {}, '#posture=pron&depth=9000&prone&show=doubt&colour=displacement'],
 ]) {
   const { page, complaints } = await open(html, { viewport: { width, height: 700 }, init }, hash);
   const isRead = !what.startsWith('before') && !what.endsWith('WebAssembly');
@@ -73,7 +73,7 @@ for (const colorScheme of ['light', 'dark']) {
   const { page, complaints } = await openLungs(
     html,
     { colorScheme },
-    '#probes=3.250&colour=difference&show=beside.ghost',
+    '#probes=3.250&colour=difference&show=beside.ghost.doubt',
   );
   await page.evaluate(() => {
     for (const details of document.querySelectorAll('details')) details.open = true;

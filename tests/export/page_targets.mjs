@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Thirty targets at random places have the same displacement and expected error in `deform`, in the table of `compare`,
 // in the report, on the page, also of a simplified surface, and in pictures. The printed report of thirty targets, with
-// long names and other scripts, has every number on the paper, in letters of a legible size.
+// long names and other scripts, has every number on the paper, in letters of a legible size. The page's switch "doubt"
+// shows the lungs of `deform --samples`, and leaves the numbers as they are.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { close, open, openLungs, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
-import { folder, randomSource, supine } from './support.mjs';
+import { floatsOf, folder, randomSource, supine } from './support.mjs';
 
 const COUNT = 30;
 const ROUNDED_MM = 0.051; // tolerance: numbers have one decimal
@@ -153,6 +154,47 @@ for (const word of long.flatMap((name) => name.split(' ')).filter((name) => /^[\
 assert.deepEqual(complaints, []);
 await close(page);
 
+/** Check that the switch, pressed by the keyboard, shows the samples of `deform` in the last of POSTURES, all targets
+ * and the surface together, and that the numbers stay. */
+async function checkDoubt(page) {
+  const drawn = join(folder, 'thirty-drawn.safetensors');
+  supine('deform', inside, '--posture', POSTURES.at(-1), '--volume', 'rest', '--samples', '20', '-o', drawn);
+  const samples = floatsOf(drawn, 'positions');
+  const words = () =>
+    page.evaluate(() =>
+      ['finding', 'meaning', 'inside-rows', 'holds'].map((id) => document.getElementById(id).textContent),
+    );
+  await page.locator('[name=day][value=session]').check({ force: true });
+  await settled(page);
+  const before = await words();
+  await page.locator('#doubt').focus();
+  await page.keyboard.press('Space');
+  const shows = (number) =>
+    page.waitForFunction((n) => {
+      const { shift, kept } = window.supine.doubt;
+      return shift && shift === kept[n - 1];
+    }, number);
+  await shows(1);
+  await page.locator('#sample').focus();
+  await page.keyboard.press('End');
+  await shows(20);
+  await settled(page);
+  assert.deepEqual(await words(), before);
+  assert.match(await page.locator('#sampled').textContent(), /^20 plausible lungs, seed 0: number 20$/);
+  const [places, far] = await page.evaluate(() => {
+    const { basis: b, doubt, insidePositions, state } = window.supine;
+    const at = insidePositions(state.gravity, state.depth, doubt.shift);
+    const square = doubt.shift.surface.reduce((sum, x) => sum + x * x, 0) / b.vertices;
+    const own = b.inside.members.map(([vertex]) => Array.from(at.slice(3 * vertex, 3 * vertex + 3)));
+    return [own, Math.sqrt(square)];
+  });
+  const away = places.map((at, i) => Math.hypot(...at.map((x, k) => x - samples[3 * (19 * COUNT + i) + k])));
+  assert.ok(Math.max(...away) < WRITTEN_MM, `targets are up to ${Math.max(...away)} mm from those of deform`);
+  assert.ok(far > 1, `the surface differs by ${far} mm`);
+  await page.locator('#doubt').press('Space');
+  assert.ok(await page.locator('#sampled').isHidden());
+}
+
 /* The page, of the whole surface and of a simplified one. */
 supine('export', basis, '--inside', inside, '-o', html);
 supine('export', basis, '--inside', inside, '-o', small, '--simplify', '500');
@@ -189,6 +231,7 @@ for (const path of [html, small]) {
       );
     });
   }
+  if (path === html) await checkDoubt(lungs);
   assert.deepEqual(said, []);
   await close(lungs);
 }

@@ -222,7 +222,7 @@ async function readBasis() {
   basis.breathes = !basis.fields || basis.order > 0; // fields of gravity alone have no volumes and no breaths
   const wasm = await WebAssembly.compile(takeBytes('wasm'));
   const [shared, own] = [takeShared(basis), takeSurface(basis)];
-  const options = { wasm, exact: true, seal: true };
+  const options = { wasm, exact: true, seal: true, doubt: true };
   const tensors = { ...own, ...shared, ...takeSquares(basis, '') };
   basis.library = await open(basisFile(tensors, metadataOf(basis, basis.metadata)), options);
   findBoxes(basis);

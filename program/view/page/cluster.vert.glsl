@@ -5,5 +5,5 @@ layout(location = 1) in vec3 own;       // the vertex's two scalars, and the ind
 out vec4 moved;
 
 void main() {
-  moved = vec4(supine_displace(reference.xyz, own.xy, uint(own.z)), 1.0);
+  moved = vec4(supine_displace(reference.xyz, own.xy, uint(own.z)) + deviation(), 1.0);
 }

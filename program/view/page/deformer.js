@@ -29,6 +29,7 @@ class Deformer extends Device {
       `#define SUPINE_VECTORS ${vectors}`,
       `#define AXES ${axes}`,
       source('supine.glsl'),
+      source('doubt.glsl'),
       source('vertex.vert.glsl'),
     ];
     return {
@@ -37,6 +38,7 @@ class Deformer extends Device {
       count: vertices,
       vertices,
       every: 1,
+      doubt: this.doubtOf(vertices),
       unit,
       coefficients: this.texture(gl.RGBA16I, gl.RGBA_INTEGER, gl.SHORT, WIDTH, height, texels),
     };
@@ -46,13 +48,22 @@ class Deformer extends Device {
    * frames, a row of six texels for each, and `array`, the vertex array. */
   clustered(array) {
     const { gl, basis } = this;
-    const text = `${source('supine.glsl')}\n${source('cluster.vert.glsl')}`;
+    const text = ['supine.glsl', 'doubt.glsl', 'cluster.vert.glsl'].map(source).join('\n');
     return {
       ...this.program('cluster.vert.glsl', null, ['moved'], text),
       array,
       count: basis.vertices,
+      every: 1,
+      doubt: this.doubtOf(basis.vertices),
       frames: this.texture(gl.RGBA32F, gl.RGBA, gl.FLOAT, FRAME_TEXELS, basis.clusters, null),
     };
+  }
+
+  /** Return the texture with a vector for each vertex, which doubt.glsl reads. */
+  doubtOf(vertices) {
+    const { gl } = this;
+    const rows = Math.ceil(vertices / WIDTH) || 1;
+    return { rows, map: this.texture(gl.RGB32F, gl.RGB, gl.FLOAT, WIDTH, rows, null) };
   }
 
   /** Make the inputs of the shader that deforms the surface, for all vertices and for the few vertices that have
@@ -162,13 +173,15 @@ class Deformer extends Device {
   }
 
   /** Run the shader program of `inputs` on their vertices, and store its output in the buffer `target`. `moment` is the
-   * state of the lungs if the inputs are those of deformed() or clustered(), otherwise null. */
-  capture(moment, inputs, target) {
+   * state of the lungs if the inputs are those of deformed() or clustered(), otherwise null. `shift` is added to the
+   * positions, mm, or null. */
+  capture(moment, inputs, target, shift) {
     const { gl } = this;
     const { program, array, count, frames } = inputs;
     gl.useProgram(program);
     if (frames) this.useFrames(moment, inputs);
     else if (moment) this.useModes(moment, inputs);
+    if (moment) this.useDoubt(inputs, shift);
     gl.bindBuffer(gl.ARRAY_BUFFER, null); // WebGL refuses to write a buffer that is bound elsewhere
     gl.bindVertexArray(array);
     gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, this.feedback);
@@ -184,12 +197,11 @@ class Deformer extends Device {
   }
 
   /** Set the uniforms and the texture of deformed() for the state `moment`. */
-  useModes({ weights, gains }, { at, coefficients, vertices, every, unit }) {
+  useModes({ weights, gains }, { at, coefficients, vertices, unit }) {
     const { gl } = this;
     gl.uniform4fv(at.supine_weights, weights);
     gl.uniform3fv(at.supine_gains, gains);
     gl.uniform1i(at.vertices, vertices);
-    gl.uniform1i(at.every, every);
     gl.uniform1f(at.unit, unit);
     gl.uniform1i(at.coefficients, 2);
     gl.activeTexture(gl.TEXTURE2);
@@ -207,22 +219,39 @@ class Deformer extends Device {
     gl.activeTexture(gl.TEXTURE0);
   }
 
+  /** Set the uniforms and the texture of doubt.glsl: vectors [vertices, 3] that are added to the positions, or null. */
+  useDoubt({ at, every, doubt: kept }, shift) {
+    const { gl } = this;
+    gl.uniform1i(at.every, every);
+    gl.uniform1i(at.doubted, shift ? 1 : 0);
+    gl.uniform1i(at.doubt, 3);
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, kept.map);
+    if (shift && kept.shift !== shift) {
+      const texels = new Float32Array(3 * WIDTH * kept.rows);
+      texels.set(shift);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, kept.rows, gl.RGB, gl.FLOAT, texels);
+      kept.shift = shift;
+    }
+    gl.activeTexture(gl.TEXTURE0);
+  }
+
   /** Deform the surface and the structures inside the lungs to the state `moment`, and store both under the name
-   * `name`. */
-  deform(name, moment) {
+   * `name`. `shift` has vectors that are added to the positions of both, mm, or is null. */
+  deform(name, moment, shift = null) {
     const { moved, turned, few, inside } = this.state(name);
-    this.captureSurface(moment, moved, turned);
-    this.capture(moment, this.fewInputs, few);
-    if (inside) this.captureInside(moment, inside);
+    this.captureSurface(moment, moved, turned, shift?.surface);
+    this.capture(moment, this.fewInputs, few, shift?.surface);
+    if (inside) this.captureInside(moment, inside, shift?.inside);
   }
 
   /** Compute the positions of the surface's vertices, then their normals, which a shader sums over the triangles. */
-  captureSurface(moment, moved, turned) {
+  captureSurface(moment, moved, turned, shift) {
     const {
       gl,
       basis: { vertices },
     } = this;
-    this.capture(moment, this.inputs, moved);
+    this.capture(moment, this.inputs, moved, shift);
     gl.bindTexture(gl.TEXTURE_2D, this.places);
     gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, moved);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, Math.ceil(vertices / WIDTH), gl.RGBA, gl.FLOAT, 0);
@@ -237,19 +266,19 @@ class Deformer extends Device {
 
   /** Deform the structures inside the lungs by the modes in the shader. In a rigid structure, the motion of a vertex
    * depends on all the others: compute the vertices of these structures here, and overwrite those of the shader. */
-  captureInside(moment, target) {
+  captureInside(moment, target, shift) {
     const {
       gl,
       basis: { inside },
     } = this;
-    this.capture(moment.within, this.insideInputs, target);
+    this.capture(moment.within, this.insideInputs, target, shift);
     gl.bindBuffer(gl.ARRAY_BUFFER, target);
-    for (const part of inside.rigid)
-      gl.bufferSubData(
-        gl.ARRAY_BUFFER,
-        16 * inside.members[part][0],
-        new Float32Array(insidePlaces(inside, moment, part).flatMap((p) => [...p, 1])),
-      );
+    for (const part of inside.rigid) {
+      const [first] = inside.members[part];
+      const at = (p, i) => [...p.map((x, k) => x + (shift?.[3 * (first + i) + k] ?? 0)), 1];
+      const places = insidePlaces(inside, moment, part).flatMap(at);
+      gl.bufferSubData(gl.ARRAY_BUFFER, 16 * first, new Float32Array(places));
+    }
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
@@ -263,14 +292,14 @@ class Deformer extends Device {
   }
 
   /** Deform the structures inside the lungs to the state `moment`, and read back the positions of their vertices, mm
-   * LPS. */
-  readInside(moment) {
+   * LPS. `shift` is added to them, if there is one. */
+  readInside(moment, shift) {
     const {
       gl,
       basis: { inside },
     } = this;
     const target = this.buffer(16 * inside.vertices, gl.DYNAMIC_READ);
-    this.captureInside(moment, target);
+    this.captureInside(moment, target, shift);
     return this.take(target, inside.vertices);
   }
 }

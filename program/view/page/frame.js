@@ -16,6 +16,8 @@ function frame(now) {
   point();
   const moving = state.advance(before === null ? 0 : (now - before) / 1000);
   if (moving) stale = unseen = true;
+  const sampled = !stale && takeSample(now); // the sample stays while the lungs move
+  if (sampled) unseen = true;
   if (!unseen) {
     if (state.moment) tellSettled(now);
     before = null;
@@ -37,8 +39,8 @@ function frame(now) {
       $('message').className = 'trouble plate';
       $('message').textContent = `No breath of ${amount(state.depth)} in this posture: ${state.trouble}.`;
     }
-    deform();
   }
+  if (stale || sampled) deform();
   if (state.moment) draw();
   if (state.moment && (state.playing || state.live)) tellSettled(now);
   asked = false;
@@ -59,7 +61,7 @@ function deform() {
     picture.deform('from', state.from);
     kept = picture;
   }
-  picture.deform('now', state.moment);
+  picture.deform('now', state.moment, state.doubt ? doubt.shift : null);
   if (state.kind === 'difference' || state.beside) picture.deform('pinned', state.pinned);
 }
 

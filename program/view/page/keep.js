@@ -2,7 +2,7 @@
 // Write the view (posture, volume, colours, camera, ...) to the URL and read it back. Save the picture as PNG.
 
 /** Fields of State whose names the URL lists under `show` if they are true. */
-const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside'];
+const SHOWN = ['contours', 'ghost', 'arrows', 'wires', 'beside', 'doubt'];
 
 const round = (x, digits = 3) => String(Number(x.toFixed(digits)));
 

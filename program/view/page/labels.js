@@ -42,13 +42,16 @@ function drawNotes() {
       }
     }
   }
-  if (below)
+  if (below) {
+    const [right, top] = [width - below[0], below[1]];
+    notes.taken.push([right - 265, top, right, top + 26]); // the switches under the lens
     changed('day', ringOf(between[state.chosen], state.day).day, (day) => {
       for (const input of document.getElementsByName('day')) input.checked = DAYS[input.value] === day;
     });
+  }
   changed('below', below?.map((x) => `${Math.round(x * grown)}px`).join(' '), (place) => {
     $('day').hidden = !place;
-    [$('day').style.right, $('day').style.top] = place?.split(' ') ?? [];
+    if (place || !state.turning) [$('rings').style.right, $('rings').style.top] = place?.split(' ') ?? ['', ''];
   });
   state.probes.forEach((vertex, i) => {
     const at = project(pane, placeOf(basis, state.moment, vertex), unit);

@@ -44,6 +44,7 @@ function showState() {
   const [side, share] = Object.entries(ENDS)
     .map(([letter, end]) => [letter, rotate(eye, end)[2]])
     .sort((a, b) => b[1] - a[1])[0];
+  showDoubt();
   write('seen', share > 0.8 ? `seen ${VIEWS[side].toLowerCase()}` : '');
 }
 

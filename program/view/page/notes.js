@@ -36,21 +36,21 @@ function drawArrow(context, [x, y], [u, v], head) {
   context.fill();
 }
 
-/** Draw the trace of a target: a dashed circle where it was, a ball where it is with a ring as far away as the expected
- * error, and an arrow. Positions and sizes are pixels. */
-function drawTrace(context, was, at, radius, ring) {
+/** Draw the trace of a target: a dashed circle where it was, a ring around where it is, as far away as the expected
+ * error, an arrow, and a ball at `seen`, where it is or could be. Positions and sizes are pixels. */
+function drawTrace(context, was, at, radius, ring, seen = at) {
   const circle = ([x, y], r) => {
     context.beginPath();
     context.arc(x, y, r, 0, 2 * Math.PI);
   };
   context.fillStyle = context.strokeStyle = css('--change');
   context.lineWidth = 1.5;
-  for (const [alpha, r] of [
-    [0.25, radius + ring],
-    [0.85, radius],
+  for (const [alpha, place, r] of [
+    [0.25, at, radius + ring],
+    [0.85, seen, radius],
   ]) {
     context.globalAlpha = alpha;
-    circle(at, r);
+    circle(place, r);
     context.fill();
   }
   context.globalAlpha = 1;
@@ -165,8 +165,9 @@ class Notes {
    * and from the top; null if the target's error is unknown. */
   lens(pane, target, radius, from, ratio, { width, height, grown: unit }) {
     const { context, taken } = this;
-    const [was, at] = [target.was, target.at].map((p) => project(pane, p, ratio));
-    if (!was || !at) return null;
+    const places = [target.was, target.at, placeInDoubt(state.chosen, target.at)];
+    const [was, at, seen] = places.map((p) => project(pane, p, ratio));
+    if (!was || !at || !seen) return null;
     const scale = 1 / (pane.pixel * unit); // units for each mm
     const narrow = width < LENS_WIDE;
     const size = Math.min(92, height * 0.2, width * 0.15);
@@ -174,7 +175,7 @@ class Notes {
     const ring = ringOf(target, state.day);
     const error = ring.error ?? 0;
     const grown = (0.92 * size) / Math.max(radius + error + 0.5 * target.mm, 10); // pixels for each mm in the lens
-    drawTrace(context, was, at, Math.max(4, radius * scale), 0);
+    drawTrace(context, was, at, Math.max(4, radius * scale), 0, seen);
     context.fillStyle = context.strokeStyle = css('--line');
     context.lineWidth = 1;
     for (const side of [-1, 1]) {
@@ -195,8 +196,8 @@ class Notes {
     context.stroke();
     context.clip();
     const centre = [0, 1].map((k) => (was[k] + at[k]) / 2);
-    const [old, now] = [was, at].map((p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown));
-    drawTrace(context, old, now, radius * grown, error * grown);
+    const inLens = (p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown);
+    drawTrace(context, inLens(was), inLens(at), radius * grown, error * grown, inLens(seen));
     context.restore();
     taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 68 : 36)]);
     if (narrow) {

@@ -77,6 +77,7 @@ async function start() {
     bindSliders,
     bindPosture,
     bindButtons,
+    bindDoubt,
   ])
     bind();
   for (const bind of [bindTheme, bindSaving, bindLink, bindKeys, bindCanvas]) bind();
@@ -98,8 +99,9 @@ const forTests = {
   /** Return the unit normals of the vertices, computed by the graphics card. */
   normals: (gravity, volume) => picture.read(momentFor(basis, unit(gravity), volume))[1],
   /** Return the positions of the vertices of structures inside the lungs, computed by the graphics card, mm LPS. They
-   * are in the order of basis.inside: points first, then meshes. */
-  insidePositions: (gravity, volume) => picture.readInside(momentFor(basis, unit(gravity), volume)),
+   * are in the order of basis.inside: points first, then meshes. `shift` is that of `doubt`, or undefined. */
+  insidePositions: (gravity, volume, shift) =>
+    picture.readInside(momentFor(basis, unit(gravity), volume), shift?.inside),
   moment: (gravity, volume) => momentFor(basis, unit(gravity), volume),
   /** Do the CPU part of the work of one frame. */
   frameScript: () => {
@@ -124,6 +126,7 @@ const forTests = {
   gravityOf,
   picturePng,
   touch,
+  doubt,
   get basis() {
     return basis;
   },

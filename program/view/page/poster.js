@@ -34,8 +34,9 @@ class Poster {
     Object.assign(this, { basis, context: canvas.getContext('2d'), places: {}, gpuTime: NaN, picking: null });
   }
 
-  deform(name, moment) {
-    this.places[name] = placesOf(this.basis, moment);
+  deform(name, moment, shift = null) {
+    const places = placesOf(this.basis, moment);
+    this.places[name] = shift?.surface ? places.map((x, i) => x + shift.surface[i]) : places;
   }
 
   read(moment) {

@@ -122,6 +122,7 @@ class State {
     this.ghost = !basis.inside;
     this.arrows = false;
     this.wires = false;
+    this.doubt = false; // whether plausible lungs are shown in place of the computed ones
     this.beside = false; // whether the other posture is shown beside the chosen one
     this.inside = Boolean(basis.inside); // whether structures inside the lungs are shown
     this.chosen = 0; // structure inside the lungs that the sentence is about

@@ -5,7 +5,6 @@ layout(location = 0) in vec4 reference; // reference position, mm; w: lung
 layout(location = 1) in vec3 direction;
 uniform highp isampler2D coefficients; // in steps of `unit`, four modes in each texel, [AXES, vertices, modes]
 uniform int vertices; // number of vertices in `coefficients`
-uniform int every;    // the vertices 0, every, 2 every ... are drawn
 uniform float unit;   // mm
 out vec4 moved;
 
@@ -21,8 +20,9 @@ float amount(int axis) {
 
 void main() {
 #if AXES == 3
-  moved = vec4(supine_displace(reference, vec3(amount(0), amount(1), amount(2))), 1.0);
+  vec3 computed = supine_displace(reference, vec3(amount(0), amount(1), amount(2)));
 #else
-  moved = vec4(supine_place(reference, direction, amount(0)), 1.0);
+  vec3 computed = supine_place(reference, direction, amount(0));
 #endif
+  moved = vec4(computed + deviation(), 1.0);
 }
