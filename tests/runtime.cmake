@@ -60,9 +60,12 @@ if(NOT SUPINE_SANITIZE AND NOT SUPINE_COVERAGE)
   add_test(NAME inputs_everywhere COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/inputs.py ${PROJECT_BINARY_DIR})
   # Give each input of each interface every kind of mistake.
   add_test(NAME doors COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/doors.py ${PROJECT_BINARY_DIR})
+  # Run the module for 3D Slicer with stand-ins for Slicer's.
+  add_test(NAME slicer COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_slicer.py ${PROJECT_BINARY_DIR})
   # Follow each advice of the program.
   add_test(NAME remedies COMMAND /usr/bin/python3 ${CMAKE_CURRENT_SOURCE_DIR}/remedies.py ${PROJECT_BINARY_DIR})
   set_tests_properties(inputs_everywhere doors remedies PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 FIXTURES_REQUIRED npm_package)
+  set_tests_properties(slicer PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77)
 endif()
 
 # Build and run the library for other platforms, where their compilers and emulators are installed.
