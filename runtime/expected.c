@@ -185,17 +185,15 @@ static void find_turn(const supine_state *state, const supine_state *from,
   m->sideways = fabs(change[0]);
 }
 
-/* Compute the pose of a state, or that of the scan if the state is the one in the scan. */
+/* Compute the pose of a state, or that of the scan if the state is the one in the scan. Refuse
+ * other states that lungs cannot hold. */
 static supine_status pose_or_scan(const supine_basis *basis, const supine_state *state,
                                   supine_pose *pose, supine_error *error) {
-  const supine_state scan = supine_basis_scan(basis);
-  const bool same = state->lung_count == 0 && state->volume.kind == scan.volume.kind &&
-                    state->volume.ml == scan.volume.ml &&
-                    supine_distance(state->gravity, scan.gravity) == 0;
-  if (basis->info.order > 0 && same) {
-    return supine_basis_scan_pose(basis, pose, error);
+  if (!supine_basis_is_scan(basis, state)) {
+    return supine_basis_pose(basis, state, pose, error);
   }
-  return supine_basis_pose_any(basis, state, pose, error);
+  return basis->info.order > 0 ? supine_basis_scan_pose(basis, pose, error)
+                               : supine_basis_pose_any(basis, state, pose, error);
 }
 
 supine_status supine_expected_prepare(const supine_basis *basis, const supine_state *state,

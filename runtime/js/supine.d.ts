@@ -64,8 +64,8 @@ export interface Basis {
   readonly facts: Fact[];
   /** All facts with a caveat as one line, which views of the lungs must show. */
   readonly caveats: string;
-  /** What the checks tell of the pose, and of the state from which the last `targets` have moved: with `allowFolds`, why
-   * lungs cannot hold it; otherwise it is refused. */
+  /** What the checks tell of the pose, and of the last state `since` that a function took in it: with `allowFolds`, why
+   * lungs cannot hold it; otherwise it is refused. A state `since` has no gain. */
   readonly findings: Finding[];
   /** Positions [3 N], mm, of the last `deform` or `deformLit`; at first the reference positions. */
   readonly positions: Float32Array;
@@ -107,7 +107,8 @@ export interface Basis {
    * vectors for normals or, if it has none, are computed from the triangles. */
   deformLit(): Float32Array;
   /** Compute the expected error [N] of the vertices in the pose, mm (3-D RMS): of their positions in the session of the
-   * scan, or of their displacements from the state `since`. The next call overwrites the result.
+   * scan, or of their displacements from the state `since`. The next call overwrites the result. It is unknown of a pose
+   * with a gain, and of poseScan.
    * @throws SupineError */
   expectedError(since?: State): Float32Array;
   /** Return the expected error of a position on another day than that of the scan, mm, from that in its session. */

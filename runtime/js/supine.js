@@ -101,7 +101,8 @@ class Basis {
   #doubt; // memory for what is asked of the field of the expected error; undefined unless it was asked for
   #drawn; // prepared samples, and the state that they are of
   #isChecked = false; // whether the pose is that of the state, which poseScan does not set
-  #sinceFindings = []; // of the state from which the last targets have moved
+  #hasErrors = false; // whether the pose is that of the state alone, without a gain
+  #sinceFindings = []; // of the last state `since`
 
   constructor(instance, bytes, options) {
     this.#c = instance.exports;
@@ -204,15 +205,10 @@ class Basis {
   }
 
   pose(state) {
-    this.#read(state);
-    const { supine_basis_pose: pose, supine_basis_pose_gain: poseGain } = this.#c;
-    if (state.gain === undefined) {
-      this.#check(pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
-    } else {
-      this.#check(poseGain(this.#basis, this.#nextState, number(state.gain, 'gain'), this.#nextPose, this.#error));
-    }
+    this.#makePose(state);
     this.#take();
     this.#isChecked = true;
+    this.#hasErrors = state.gain === undefined;
     this.#sinceFindings = [];
     return this;
   }
@@ -221,8 +217,33 @@ class Basis {
     this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
     this.#take();
     this.#isChecked = false;
+    this.#hasErrors = false;
     this.#sinceFindings = [];
     return this;
+  }
+
+  /** Write a state and its pose to #nextState and #nextPose. */
+  #makePose(state) {
+    this.#read(state);
+    const { supine_basis_pose: pose, supine_basis_pose_gain: poseGain } = this.#c;
+    if (state.gain === undefined) {
+      this.#check(pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
+    } else {
+      this.#check(poseGain(this.#basis, this.#nextState, number(state.gain, 'gain'), this.#nextPose, this.#error));
+    }
+  }
+
+  /** Make the pose of the state from which displacements are asked, and judge it, or make that of the scan. Return the
+   * address of the state; 0 for the scan. */
+  #poseSince(since) {
+    if (since === undefined) {
+      this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
+      return 0;
+    }
+    if (since?.gain !== undefined) throw refusal('the expected error since a state with a gain is unknown: give a volume');
+    this.#makePose(since);
+    this.#sinceFindings = this.#judge(this.#nextState, this.#nextPose);
+    return this.#nextState;
   }
 
   /** Make the next state and pose the current ones. */
@@ -324,10 +345,19 @@ class Basis {
   }
 
   expectedError(since) {
-    if (since !== undefined) this.#read(since);
-    const from = since === undefined ? 0 : this.#nextState;
+    return this.#expectedErrorFrom(this.#poseSince(since));
+  }
+
+  #expectedErrorFrom(from) {
+    this.#needErrors();
     this.#check(this.#c.supine_expected_error(this.#basis, this.#state, from, this.#expected, this.#error));
     return this.#view(Float32Array, this.#expected, this.vertexCount);
+  }
+
+  #needErrors() {
+    if (this.#hasErrors) return;
+    const unsupported = STATUS.indexOf('unsupported');
+    throw new SupineError('the expected error of a gain or of poseScan is unknown: pose a state', unsupported);
   }
 
   anotherDay(sameSession) {
@@ -345,10 +375,10 @@ class Basis {
   /** Prepare the field of the expected error in the state of the pose; return its address. */
   #prepareDoubt(since, anotherDay = false) {
     if (this.#doubt === undefined) throw refusal('no memory is reserved for this: open the basis with { doubt: true }');
-    if (since !== undefined) this.#read(since);
+    this.#needErrors();
+    const from = this.#poseSince(since);
     this.#drawn = undefined; // the field is in the same memory
     const { task, field } = this.#doubt;
-    const from = since === undefined ? 0 : this.#nextState;
     this.#view(Uint32Array, task, 5).set([this.#basis, 1, this.#state, from, anotherDay ? 1 : 0]);
     this.#check(this.#c.supine_doubt_prepare(task, field, this.#text, this.#error));
     return this.#word(this.#text);
@@ -404,10 +434,10 @@ class Basis {
     return this.#drawn;
   }
 
-  /** Return expectedError(since), or NaN for each vertex of another simulator's fields, whose error is unknown. */
-  #expectedOrUnknown(since) {
+  /** Return the expected error, or NaN for each vertex of another simulator's fields, whose error is unknown. */
+  #expectedOrUnknown(from) {
     try {
-      return this.expectedError(since);
+      return this.#expectedErrorFrom(from);
     } catch (error) {
       if (error.status !== 'unsupported') throw error;
       return new Float32Array(this.vertexCount).fill(NaN);
@@ -416,14 +446,8 @@ class Basis {
 
   targets(since) {
     const after = this.deform().slice();
-    const sigma = this.#expectedOrUnknown().slice();
-    const moved = this.#expectedOrUnknown(since);
-    if (since === undefined) {
-      this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
-    } else {
-      this.#check(this.#c.supine_basis_pose(this.#basis, this.#nextState, this.#nextPose, this.#error));
-      this.#sinceFindings = this.#judge(this.#nextState, this.#nextPose);
-    }
+    const sigma = this.#expectedOrUnknown(0).slice();
+    const moved = this.#expectedOrUnknown(this.#poseSince(since));
     this.#evaluate(this.#c.supine_deform(this.#basis, this.#nextPose, this.#positions));
     const made = this.#emptyTargets();
     (this.tensor('part')?.data ?? []).forEach((index, v) => {

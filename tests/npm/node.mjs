@@ -167,13 +167,33 @@ assert.match(allowed.pose('supine:full+2L').findings[0].text, /of full inflation
 assert.equal(allowed.findings[0].warning, true);
 assert.equal(allowed.findings.length, 1);
 assert.deepEqual(allowed.pose('prone').findings, []);
-const folding = await open(readFileSync(inside), { allowFolds: true });
-folding.pose('prone').targets('supine:full+2L');
-assert.match(folding.findings[0].text, /^supine at full inflation \+ 2000 mL: .* of full inflation/);
-assert.deepEqual(folding.pose('prone').findings, []);
+const strict = (await open(readFileSync(inside), { doubt: true })).pose('prone');
+const folding = await open(readFileSync(inside), { allowFolds: true, doubt: true });
+for (const ask of [
+  (basis, since) => basis.targets(since),
+  (basis, since) => basis.expectedError(since),
+  (basis, since) => basis.covariance([0], { since }),
+  (basis, since) => basis.registration([0, 100, 200], { since }),
+]) {
+  ask(folding.pose('prone'), 'supine:full+2L');
+  assert.equal(folding.findings.length, 1, ask);
+  assert.match(folding.findings[0].text, /^supine at full inflation \+ 2000 mL: .* of full inflation/);
+  assert.deepEqual(folding.pose('prone').findings, []);
+  assert.throws(() => ask(strict, 'supine:full+2L'), { status: 'numerical', message: /allowFolds: true/ });
+  assert.throws(() => ask(strict, { gain: 1 }), { status: 'argument', message: /give a volume/ });
+  assert.throws(() => ask(strict, null), { status: 'argument', message: /a state must be/ });
+}
 for (const gain of [NaN, Infinity])
   assert.throws(() => lungs.pose({ gravity: [0, 1, 0], gain }), { status: 'argument' });
-assert.equal((await open(readFileSync(inside))).tensor('names').data.length > 0, true);
+assert.equal(strict.tensor('names').data.length > 0, true);
+
+/* A pose that no state describes has no expected error. */
+for (const pose of [() => strict.poseScan(), () => strict.pose({ gain: 1 })]) {
+  pose();
+  for (const ask of [() => strict.expectedError(), () => strict.covariance([0]), () => strict.sample(0)])
+    assert.throws(ask, { status: 'unsupported', message: /pose a state/ });
+  assert.ok(strict.targets().every(({ expectedError, movedError }) => Number.isNaN(expectedError + movedError)));
+}
 
 /* Gravity from a rotation: of three.js's objects, which face +z, and cameras, which face -z. */
 const { Matrix3, Object3D, PerspectiveCamera } = loadCommon('three');

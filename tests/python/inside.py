@@ -127,6 +127,18 @@ with warnings.catch_warnings(record=True) as said:
     allowed.pose("prone").fill(9.81)
     assert len(said) == 2 and "of full inflation" in str(said[1].message), said
 
+# A state `since` is judged as that of a pose, by all that take one.
+TOO_FULL = "supine:full+2L"
+for ask in (lambda basis, since: basis.expected_error("prone", since=since),
+            lambda basis, since: basis.covariance([0], "prone", since),
+            lambda basis, since: basis.samples("prone", 1, since=since),
+            lambda basis, since: basis.registration("prone", [0, 60, 120], since)):
+    refused(supine.NumericalError, "of full inflation", ask, lungs, TOO_FULL)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        ask(allowed, TOO_FULL)
+    assert [str(one.message).partition(":")[0] for one in said] == ["supine at full inflation + 2000 mL"], said
+
 # A number is neither a volume nor a state.
 for wrong in (2600, 2600.0, np.float64(2600)):
     refused(supine.ArgumentError, "'2600mL'", lungs.pose, "prone", wrong)

@@ -96,6 +96,26 @@ TEST(test_covariance_known_volume_equals_kernel_of_expected_error) {
   }
 }
 
+TEST(test_expected_error_from_impossible_state_refused) {
+  const world *w = *state;
+  const supine_doubt *doubt = NULL;
+  float sigma[VERTICES];
+  double space[8192];
+  supine_expected_part parts[SUPINE_EXPECTED_TERMS];
+  supine_state from;
+  supine_error error = {0};
+  assert_int_equal(supine_state_parse("supine:90L", &from, &error), SUPINE_OK);
+  const supine_doubt_task task = {w->basis, 1, w->states, &from, false};
+  assert_true(supine_doubt_space(1) <= sizeof space / sizeof *space);
+  assert_int_equal(supine_expected_error(w->basis, w->states, &from, sigma, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  assert_says(error.message, "supine at 90000 mL");
+  assert_int_equal(supine_expected_parts(w->basis, w->states, &from, parts, &error),
+                   SUPINE_ERROR_NUMERICAL);
+  assert_int_equal(supine_doubt_prepare(&task, space, &doubt, &error), SUPINE_ERROR_NUMERICAL);
+  assert_null(doubt);
+}
+
 /* After a fit of landmarks, the term of the displacement is the same everywhere but for the share
  * that these leave, with the mean square that the displacement's RMS gives. */
 TEST(test_expected_error_after_landmarks_follows_their_shares) {

@@ -105,7 +105,7 @@ typedef enum supine_expected_term {
  * vertex.
  * @param from   NULL for the state of the scan
  * @param sigma  [N] expected 3-D RMS errors, mm, written
- * @return a status of supine_basis_pose, or one of these:
+ * @return a status of supine_basis_pose, for either state, or one of these:
  * @retval SUPINE_ERROR_UNSUPPORTED  the basis was made from another simulator's displacements, and
  *   lacks their errors, as points do that 'supine embed' adds */
 SUPINE_API supine_status supine_expected_error(const supine_basis *basis, const supine_state *state,

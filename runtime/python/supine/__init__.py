@@ -388,11 +388,17 @@ class Basis:
         `pose((0, 0.6, -0.8), "rest")`, or with a volume for each lung, `pose("prone", {"left": "rest", "right":
         "2L"})`. The default volume is rest if the basis has a volume at rest. `out` is a pose to write into.
         Warns of a volume that lungs cannot hold, if the basis was opened with `allow_folds`."""
-        out, wanted = Pose() if out is None else out, _state(state, volume)
-        _c.basis_pose(self._c, wanted, out)
-        out._made = self._owner, wanted.gravity
-        self._owner.tell(wanted, out)
+        out = Pose() if out is None else out
+        self._judge(_state(state, volume), out)
         return out
+
+    def _judge(self, wanted: Any, pose: Optional[Pose] = None) -> Any:
+        """Write the pose of a state, which is refused, or told, if lungs cannot hold it. Return the state."""
+        pose = Pose() if pose is None else pose
+        _c.basis_pose(self._c, wanted, pose)
+        pose._made = self._owner, wanted.gravity
+        self._owner.tell(wanted, pose)
+        return wanted
 
     def expected_error(self, state: Gravity, volume: Volume = "", since: Optional[Gravity] = None) -> Floats:
         """Compute the expected error [N] of the vertices in a state, mm (3-D RMS): of their positions in the session of
@@ -401,16 +407,18 @@ class Basis:
         of posture they are extrapolated. On another day than that of the scan, positions have the error
         `another_day`. Of another simulator's fields, it is the error of the fit to the simulator, RMS over runs
         left out."""
+        return self._expected(self._judge(_state(state, volume)), None if since is None else self._judge(_state(since)))
+
+    def _expected(self, wanted: Any, origin: Any) -> Floats:
         sigma = np.empty(self.vertex_count, _FLOAT)
-        _c.expected_error(self._c, _state(state, volume), None if since is None else _state(since),
-                          _address(sigma, self.vertex_count, "sigma"))
+        _c.expected_error(self._c, wanted, origin, _address(sigma, self.vertex_count, "sigma"))
         return sigma
 
     def _doubt(self, states: Sequence[Gravity], since: Optional[Gravity], another_day: bool) -> tuple[Any, Any]:
         """Prepare the random field of the expected error; return it, and the memory that it needs."""
         space, field = np.empty(_c.doubt_space(len(states))), ctypes.c_void_p()
-        given = (_c.State * len(states))(*(_state(state) for state in states))
-        origin = None if since is None else ctypes.pointer(_state(since))
+        given = (_c.State * len(states))(*(self._judge(_state(state)) for state in states))
+        origin = None if since is None else ctypes.pointer(self._judge(_state(since)))
         _c.doubt_prepare(_c.DoubtTask(self._c, len(states), given, origin, another_day), space.ctypes.data, field)
         return field, space
 
@@ -468,15 +476,15 @@ class Basis:
         names, part = self.tensor("names"), self.tensor("part")
         if names is None or part is None:
             raise ArgumentError("the basis names no structures: make one with embed")
-        origin = Pose()
+        pose, origin = Pose(), Pose()
+        wanted = self._judge(_state(state, volume), pose)
+        was = None if since is None else self._judge(_state(since), origin)
         if since is None:
             _c.basis_scan_pose(self._c, origin)
-        else:
-            self.pose(since, out=origin)
-        after, before = self.deform(self.pose(state, volume)).astype(np.float64), self.deform(origin).astype(np.float64)
+        after, before = self.deform(pose).astype(np.float64), self.deform(origin).astype(np.float64)
         try:
-            sigma: Any = self.expected_error(state, volume)
-            moved: Any = self.expected_error(state, volume, since)
+            sigma: Any = self._expected(wanted, None)
+            moved: Any = self._expected(wanted, was)
         except UnsupportedError:
             sigma = moved = np.full(self.vertex_count, np.nan)
         anatomy = self.tensor("anatomy")
