@@ -11,7 +11,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-# Packages needed to build, by the quick tests, by all tests, and by those of other platforms.
+# Packages needed to build, by the quick tests, and by all tests, of which those of other platforms are a command of their own.
 build="gcc libc6-dev cmake ninja-build pkg-config libfftw3-dev libgsl-dev libassimp-dev libjansson-dev
   libopenblas-dev liblapacke-dev libsuitesparse-dev libxxhash-dev libcairo2-dev libpango1.0-dev libwebp-dev
   libwebsockets-dev libnifti2-dev zlib1g-dev libdeflate-dev
@@ -74,7 +74,7 @@ test)
   exec ctest --preset release $at_a_time -L '^quick$'
   ;;
 "test all")
-  build_tests $all
+  build_tests $all $platforms
   exec ctest --preset release $at_a_time
   ;;
 anywhere)
@@ -83,7 +83,7 @@ anywhere)
   ;;
 platforms)
   build_tests $platforms
-  exec ctest --preset release -R '^platform_'
+  exec ctest --preset release $at_a_time -R '^platform_'
   ;;
 *)
   echo "usage: sh cmake/debian.sh demo|build|test|test all|anywhere|platforms|count" >&2

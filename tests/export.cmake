@@ -20,4 +20,3 @@ foreach(what colour glb numbers pages) # pages.mjs holds all tests that need a b
   set_tests_properties(export_${what}_node PROPERTIES TIMEOUT ${hang} SKIP_RETURN_CODE 77 ENVIRONMENT
     "SUPINE=$<TARGET_FILE:supine>;POSITIONS=$<TARGET_FILE:export_positions>;MODULES=${SUPINE_NODE_MODULES};CHROMIUM=${CHROMIUM_PROGRAM}")
 endforeach()
-set_tests_properties(export_pages_node PROPERTIES COST 1000) # the longest test starts first

@@ -6,7 +6,7 @@ supine_test(precompute/patient_memory supine_patient supine_lungs supine_base su
 target_link_options(test_patient_memory PRIVATE -Wl,--wrap=malloc,--wrap=calloc)
 add_test(NAME patient_command COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_patient_command.sh
   $<TARGET_FILE:supine>)
-set_tests_properties(patient_command PROPERTIES TIMEOUT ${hang} COST 500)
+set_tests_properties(patient_command PROPERTIES TIMEOUT ${hang})
 add_test(NAME patient_refused COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/scripts/test_patient_refused.sh
   $<TARGET_FILE:supine>)
 set_tests_properties(patient_refused PROPERTIES TIMEOUT ${hang})
