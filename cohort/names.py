@@ -7,8 +7,7 @@ RESERVED = ("", ".", "..", "group.csv", "group.html")  # results of the group li
 
 def fault(name):
     """Return what is wrong with the name of a subject, or None."""
-    if name is None or name in RESERVED or re.search(r"[/\\\\{}\x00-\x1f]", name) or name.startswith("-"):
-        return (f"'{name}' cannot be the name of a subject, as it names the folder of its results: use letters, "
-                f"digits and - . _ +, "
-                "and no / or \\")
+    if name is None or name in RESERVED or re.search(r"[/\\{}\x00-\x1f]", name) or name.startswith("-"):
+        return (f"'{name}' cannot be the name of a subject, as it names the folder of its results: "
+                "use letters, digits and - . _ +, and no / or \\")
     return None

@@ -28,19 +28,40 @@ static void write_file(void (*write)(FILE *file), const char *folder, const char
   exit(SUPINE_EXIT_OUTPUT);
 }
 
+typedef void option_writer(const char *command, const supine_option *option, FILE *file);
+
 typedef struct context {
   const char *command;
+  option_writer *write;
   FILE *file;
 } context;
 
-/* Call `each` for the options of a command, also for those that no table has. */
-static void visit_options(const supine_command *command, supine_option_visit *each, FILE *file) {
+static void write_option(void *given, const supine_option *option, size_t base) {
+  const context *c = given;
+  (void)base;
+  if (option->name != NULL) { /* else it is a heading */
+    c->write(c->command, option, c->file);
+  }
+}
+
+/* Write the options of a command, also those that no table has. */
+static void write_options(const supine_command *command, option_writer *write, FILE *file) {
   static const supine_option help = {"help", .help = "explain the command"};
   static const supine_option help_all = {"help-all", .help = "explain every option"};
-  context c = {command->name, file};
-  supine_options_visit(command, each, &c);
-  each(&c, &help, 0);
-  each(&c, &help_all, 0);
+  context c = {command->name, write, file};
+  supine_options_visit(command, write_option, &c);
+  write(command->name, &help, file);
+  write(command->name, &help_all, file);
+}
+
+/* Write what the program takes as its first word, with a summary. */
+static void write_commands(void (*write)(const char *name, const char *summary, FILE *file),
+                           FILE *file) {
+  write("help", "list the commands", file);
+  write("--version", "print the version", file);
+  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
+    write(supine_command_list[i]->name, supine_command_list[i]->summary, file);
+  }
 }
 
 /* Write what may follow an option: its choices, between spaces. */
@@ -65,40 +86,35 @@ static void write_text(const char *text, const char *quote, const char *special,
   }
 }
 
-/* What the program takes in place of a command. */
-static const char *const others[][2] = {{"help", "list the commands"},
-                                        {"--version", "print the version"}};
-enum { OTHERS = sizeof others / sizeof others[0] };
-
 /* Write the bash case that completes the value of an option by its choices, by names of files, or
  * not at all. */
-static void bash_value(void *given, const supine_option *option, size_t base) {
-  const context *c = given;
-  (void)base;
-  if (option->name == NULL || option->argument == NULL) {
+static void bash_value(const char *command, const supine_option *option, FILE *file) {
+  if (option->argument == NULL) {
     return;
   }
-  (void)fprintf(c->file, "  %s:--%s", c->command, option->name);
+  (void)fprintf(file, "  %s:--%s", command, option->name);
   if (option->letter != 0) {
-    (void)fprintf(c->file, " | %s:-%c", c->command, option->letter);
+    (void)fprintf(file, " | %s:-%c", command, option->letter);
   }
   if (option->choices != NULL) {
-    (void)fputs(") COMPREPLY=($(compgen -W '", c->file);
-    write_choices(option, c->file);
-    (void)fputs("' -- \"$cur\")); return ;;\n", c->file);
+    (void)fputs(") COMPREPLY=($(compgen -W '", file);
+    write_choices(option, file);
+    (void)fputs("' -- \"$cur\")); return ;;\n", file);
   } else if (option->file != SUPINE_FILE_NONE) {
-    (void)fputs(") COMPREPLY=($(compgen -f -- \"$cur\")); return ;;\n", c->file);
+    (void)fputs(") COMPREPLY=($(compgen -f -- \"$cur\")); return ;;\n", file);
   } else {
-    (void)fputs(") return ;;\n", c->file);
+    (void)fputs(") return ;;\n", file);
   }
 }
 
-static void bash_name(void *given, const supine_option *option, size_t base) {
-  const context *c = given;
-  (void)base;
-  if (option->name != NULL) {
-    (void)fprintf(c->file, "--%s ", option->name);
-  }
+static void bash_option(const char *command, const supine_option *option, FILE *file) {
+  (void)command;
+  (void)fprintf(file, "--%s ", option->name);
+}
+
+static void bash_command(const char *name, const char *summary, FILE *file) {
+  (void)summary;
+  (void)fprintf(file, "%s ", name);
 }
 
 static void write_bash(FILE *file) {
@@ -108,20 +124,15 @@ static void write_bash(FILE *file) {
               "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
               "    COMPREPLY=($(compgen -W '",
               file);
-  for (size_t i = 0; i < OTHERS; ++i) {
-    (void)fprintf(file, "%s%s", i > 0 ? " " : "", others[i][0]);
-  }
-  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    (void)fprintf(file, " %s", supine_command_list[i]->name);
-  }
+  write_commands(bash_command, file);
   (void)fputs("' -- \"$cur\"))\n    return\n  fi\n  case \"${COMP_WORDS[1]}:$prev\" in\n", file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    visit_options(supine_command_list[i], bash_value, file);
+    write_options(supine_command_list[i], bash_value, file);
   }
   (void)fputs("  esac\n  case \"${COMP_WORDS[1]}\" in\n", file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
     (void)fprintf(file, "  %s) words='", supine_command_list[i]->name);
-    visit_options(supine_command_list[i], bash_name, file);
+    write_options(supine_command_list[i], bash_option, file);
     (void)fputs("' ;;\n", file);
   }
   (void)fputs("  esac\n"
@@ -146,12 +157,8 @@ static void zsh_command(const char *name, const char *summary, FILE *file) {
 
 /* Write the specification of an option, '(NAMES)'{NAMES}'[HELP]:ARGUMENT:VALUES', for _arguments.
  */
-static void zsh_option(void *given, const supine_option *option, size_t base) {
-  FILE *file = ((const context *)given)->file;
-  (void)base;
-  if (option->name == NULL) {
-    return;
-  }
+static void zsh_option(const char *command, const supine_option *option, FILE *file) {
+  (void)command;
   (void)fputs(" \\\n    ", file);
   if (option->repeats) {
     (void)fputs("'*'", file);
@@ -184,12 +191,7 @@ static void write_zsh(FILE *file) {
               "# zsh completion for supine, generated from its tables of options\n"
               "local -a commands=(\n",
               file);
-  for (size_t i = 0; i < OTHERS; ++i) {
-    zsh_command(others[i][0], others[i][1], file);
-  }
-  for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    zsh_command(supine_command_list[i]->name, supine_command_list[i]->summary, file);
-  }
+  write_commands(zsh_command, file);
   (void)fputs(")\n"
               "if (( CURRENT == 2 )); then\n"
               "  _describe command commands\n"
@@ -201,7 +203,7 @@ static void write_zsh(FILE *file) {
               file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
     (void)fprintf(file, "%s)\n  _arguments -s", supine_command_list[i]->name);
-    visit_options(supine_command_list[i], zsh_option, file);
+    write_options(supine_command_list[i], zsh_option, file);
     (void)fputs(" \\\n    '*:file:_files'\n  ;;\n", file);
   }
   (void)fputs("esac\n", file);
@@ -213,25 +215,19 @@ static void fish_text(const char *text, FILE *file) {
   (void)fputs("'\n", file);
 }
 
-static void fish_option(void *given, const supine_option *option, size_t base) {
-  const context *c = given;
-  (void)base;
-  if (option->name == NULL) {
-    return;
-  }
-  (void)fprintf(c->file, "complete -c supine -n '__supine_command %s' -l %s", c->command,
-                option->name);
+static void fish_option(const char *command, const supine_option *option, FILE *file) {
+  (void)fprintf(file, "complete -c supine -n '__supine_command %s' -l %s", command, option->name);
   if (option->letter != 0) {
-    (void)fprintf(c->file, " -s %c", option->letter);
+    (void)fprintf(file, " -s %c", option->letter);
   }
   if (option->argument != NULL && option->choices != NULL) {
-    (void)fputs(" -x -a '", c->file);
-    write_choices(option, c->file);
-    (void)fputc('\'', c->file);
+    (void)fputs(" -x -a '", file);
+    write_choices(option, file);
+    (void)fputc('\'', file);
   } else if (option->argument != NULL) {
-    (void)fputs(option->file != SUPINE_FILE_NONE ? " -r" : " -x", c->file);
+    (void)fputs(option->file != SUPINE_FILE_NONE ? " -r" : " -x", file);
   }
-  fish_text(option->help, c->file);
+  fish_text(option->help, file);
 }
 
 static void fish_command(const char *name, const char *summary, FILE *file) {
@@ -246,12 +242,9 @@ static void write_fish(FILE *file) {
               "  test \"$words[2]\" = \"$argv[1]\"\n"
               "end\n",
               file);
-  for (size_t i = 0; i < OTHERS; ++i) {
-    fish_command(others[i][0], others[i][1], file);
-  }
+  write_commands(fish_command, file);
   for (size_t i = 0; supine_command_list[i] != NULL; ++i) {
-    fish_command(supine_command_list[i]->name, supine_command_list[i]->summary, file);
-    visit_options(supine_command_list[i], fish_option, file);
+    write_options(supine_command_list[i], fish_option, file);
   }
 }
 

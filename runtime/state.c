@@ -150,6 +150,7 @@ typedef struct turned {
   double roll, tilt; /* degrees */
 } turned;
 
+/* Read a posture that is turned. Return false if it is not turned, or is wrong. */
 static bool read_turned(const char *text, turned *read) {
   const size_t length = strcspn(text, "+-@>");
   const char *at = text + length;

@@ -66,7 +66,8 @@ static bool is_attribute(const element *e, const char *name, const char *wanted)
   return attribute(e, name, value, sizeof value) && strcmp(value, wanted) == 0;
 }
 
-static uint64_t little(const unsigned char *bytes, size_t size) {
+/* Read a little-endian number of `size` bytes. */
+static uint64_t read_number(const unsigned char *bytes, size_t size) {
   uint64_t value = 0;
   for (size_t i = size; i-- > 0;) {
     value = value << 8 | bytes[i];
@@ -83,7 +84,7 @@ static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, s
   const size_t h = v->header_size;
   const unsigned char *end = bytes + size;
   if (!v->compressed) {
-    if (size < h || little(bytes, h) != wanted || size - h < wanted) {
+    if (size < h || read_number(bytes, h) != wanted || size - h < wanted) {
       return false;
     }
     memcpy(out, bytes + h, wanted);
@@ -92,9 +93,9 @@ static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, s
   if (size < 3 * h) {
     return false;
   }
-  const uint64_t blocks = little(bytes, h);
-  const uint64_t block = little(bytes + h, h);
-  const uint64_t last = little(bytes + 2 * h, h);
+  const uint64_t blocks = read_number(bytes, h);
+  const uint64_t block = read_number(bytes + h, h);
+  const uint64_t last = read_number(bytes + 2 * h, h);
   if (blocks == 0) {
     return wanted == 0;
   }
@@ -104,7 +105,7 @@ static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, s
   }
   const unsigned char *packed = bytes + (3 + blocks) * h;
   for (uint64_t b = 0; b < blocks; ++b) {
-    const uint64_t here = little(bytes + (3 + b) * h, h);
+    const uint64_t here = read_number(bytes + (3 + b) * h, h);
     const uint64_t whole = b + 1 < blocks || last == 0 ? block : last;
     uLongf made = whole;
     if (here > (uint64_t)(end - packed) ||

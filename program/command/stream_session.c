@@ -91,13 +91,16 @@ static supine_status open_points(const supine_basis *basis, const supine_stream_
       supine_options_inside_open(basis, wanted->points, &points->inside, &points->names, error));
   size_t count = 0;
   for (size_t part = 0; part < names->count; ++part) {
-    const bool single = names->begin[part + 1] - names->begin[part] == 1;
-    if (single && count++ < SUPINE_LOCATE_POINTS_MAX) {
-      observed->name[count - 1] = names->text[part];
-      observed->last[count - 1] = (supine_observation){.vertex = names->order[names->begin[part]],
-                                                       .position = {(double)NAN},
-                                                       .noise = wanted->noise};
+    if (names->begin[part + 1] - names->begin[part] != 1) {
+      continue;
     }
+    if (count < SUPINE_LOCATE_POINTS_MAX) {
+      observed->name[count] = names->text[part];
+      observed->last[count] = (supine_observation){.vertex = names->order[names->begin[part]],
+                                                   .position = {(double)NAN},
+                                                   .noise = wanted->noise};
+    }
+    ++count;
   }
   SUPINE_REFUSE_IF(count == 0 || count > SUPINE_LOCATE_POINTS_MAX, error, SUPINE_ERROR_FORMAT,
                    "%s holds %zu points: give a file with 1 to %d", wanted->points, count,

@@ -43,6 +43,7 @@ static void collect(void *context, const supine_option *option, size_t base) {
   }
 }
 
+/* Return whether a number is in the range of an option; 0 to 0 stands for any. */
 static bool within(const supine_option *option, double number) {
   const double low = option->range[0];
   const double high = option->range[1];

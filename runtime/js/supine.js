@@ -240,7 +240,7 @@ class Basis {
       this.#check(this.#c.supine_basis_scan_pose(this.#basis, this.#nextPose, this.#error));
       return 0;
     }
-    if (since?.gain !== undefined) throw refusal('the expected error since a state with a gain is unknown: give a volume');
+    if (since?.gain !== undefined) throw refusal('the expected error from a gain is unknown: give a volume');
     this.#makePose(since);
     this.#sinceFindings = this.#judge(this.#nextState, this.#nextPose);
     return this.#nextState;

@@ -17,6 +17,8 @@ import struct
 import subprocess
 import tempfile
 
+from evidence import pairs
+
 
 class Program:
     def __init__(self, build, folder):
@@ -71,13 +73,9 @@ def print_forces(program, folder):
 def print_normals(program, arguments):
     print("\n| pair | normals: mean error, degrees | 99.9th percentile |\n|---|---|---|")
     for argument in arguments:
-        folder, _, axes = argument.partition(":")
-        for left in sorted(glob.glob(os.path.join(folder, "*_left.*"))):
-            right = left.replace("_left.", "_right.")
-            if os.path.exists(right):
-                found = program.metadata(left, right, *(["--axes", axes] if axes else []))
-                print("| %s | %s | %s |" % (os.path.basename(left).partition("_left")[0], found["normals_mean_degrees"],
-                                            found["normals_p999_degrees"]), flush=True)
+        for name, left, right, axes in pairs(argument):
+            found = program.metadata(left, right, *(["--axes", axes] if axes else []))
+            print("| %s | %s | %s |" % (name, found["normals_mean_degrees"], found["normals_p999_degrees"]), flush=True)
 
 
 def main():

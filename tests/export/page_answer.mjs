@@ -100,8 +100,7 @@ const [summed, held] = await page.evaluate(() => {
 });
 for (const ml of summed) assert.ok(Math.abs(ml - held) < 0.001 * held, `outlines enclose ${summed} mL, lungs ${held}`);
 
-/* Dragging the line in one of the two pictures of slices, or pressing arrow keys there, moves the slice of the other.
- * */
+/* Dragging the line in one of the two pictures of slices, or pressing arrow keys, moves the slice of the other. */
 const slices = () => page.evaluate(() => window.supine.state.slices);
 const before = await slices();
 const box = await page.locator('#outlines canvas').nth(1).boundingBox();

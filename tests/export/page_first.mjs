@@ -108,8 +108,7 @@ const rows = () =>
   );
 const ratio = ([, mm, , error]) => parseFloat(mm) / parseFloat(error);
 
-/* The sentence is about the target with the largest displacement over its error, in each posture, until one is chosen.
- * */
+/* The sentence is about the target with the largest displacement over its error in the posture, until one is chosen. */
 for (const [key, posture] of [
   ['3', 'Lying on the left side'],
   ['2', 'Prone'],
@@ -149,8 +148,7 @@ for (const name of NAMES) {
   assert.ok(shown && graphemes(shown) <= LONGEST, `${name}: ${still.drawn}`);
 }
 
-/* Anatomy: the list has its colour, the slices its contour, the picture no ball or lens, and a target inside is found.
- * */
+/* Anatomy: the list has its colour, slices its contour, the picture no ball or lens; a target inside is found. */
 const large = await page.evaluate(() => {
   const {
     basis: { inside: i },

@@ -282,8 +282,7 @@ class Deformer extends Device {
     gl.bindBuffer(gl.ARRAY_BUFFER, null);
   }
 
-  /** Deform the surface to the state `moment`, and read back the positions, mm LPS, and unit normals of its vertices.
-   * */
+  /** Deform the surface to the state `moment`; read back positions, mm LPS, and unit normals of its vertices. */
   read(moment) {
     const { gl, basis } = this;
     const targets = [0, 1].map(() => this.buffer(16 * WIDTH * Math.ceil(basis.vertices / WIDTH), gl.DYNAMIC_READ));

@@ -3,8 +3,7 @@
 
 const sumOf = (values) => values.reduce((sum, x) => sum + x, 0);
 
-/** Return the state of a moment as supine.js takes it; `depth` is mL above rest, or above the scan if rest is unknown.
- * */
+/** Return the state of a moment as supine.js takes it; `depth` is mL above rest, or above the scan without a rest. */
 function stateFor(basis, gravity, depth) {
   if (!basis.breathes) return { gravity };
   const sign = depth < 0 ? '-' : '+';
@@ -78,8 +77,7 @@ const placesOf = (basis, moment) => placesIn(basis.library, moment);
 /** Return the position of a vertex of the surface at a moment, mm. */
 const placeOf = (basis, moment, vertex) => pose(basis.library, moment).at(vertex);
 
-/** Compute the positions of the corners of up to 3000 triangles, mm. They suffice to choose the range of the colours.
- * */
+/** Compute the positions of the corners of up to 3000 triangles, mm: enough to choose the range of the colours. */
 function samplePlaces(basis, moment) {
   const stride = 3 * Math.max(1, Math.ceil(basis.corners.length / 3 / 3000));
   const all = placesOf(basis, moment);

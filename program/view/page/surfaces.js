@@ -85,8 +85,7 @@ class Surfaces extends Deformer {
     set('dark', pane.dark ? 1 : 0);
     set('flatly', 0);
     gl.uniform4fv(surface.at.rise, pane.rise);
-    /** Draw the lungs in the state from which displacements are measured: a translucent shell (1) or its outline (2).
-     * */
+    /** Draw the lungs in the state from which displacements are measured: a translucent shell (1) or outline (2). */
     const ghost = (how) => {
       if (!pane.ghost) return;
       gl.bindVertexArray(this.shown('from', 'from'));
