@@ -159,12 +159,6 @@ static void check_size(checks *c, const supine_lungs *lungs, bool likely) {
         "the lungs are %.0f mm high and hold %.0f mL, which is impossible: correct the voxel "
         "spacing in the header, or the unit",
         height, ml);
-  if (c->status == SUPINE_OK && ml < 1500.0 * most) {
-    supine_findings_note(c->findings,
-                         "%s: the lungs hold %.0f mL, as a child's may: for an adult, check the "
-                         "voxel spacing",
-                         c->source->name, ml);
-  }
 }
 
 /* Check that no lung is hollow: that its surface is not too large for the volume that it encloses,
