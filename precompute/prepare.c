@@ -86,18 +86,6 @@ static void tell_volume(const supine_patient_record *record, supine_findings *fi
   }
 }
 
-/* Say if the lungs have another size than in the scan of this state when the law was fitted. */
-static void tell_size(const supine_patient_record *fitted, size_t state, const supine_lungs *lungs,
-                      supine_findings *findings) {
-  const supine_patient_frame *frame = &fitted->patient.frame;
-  const double *low = state == 0 ? frame->minimum : fitted->emptier[0];
-  const double *high = state == 0 ? frame->maximum : fitted->emptier[1];
-  const bool both = lungs->lung_count == 2 && frame->only_side == 0;
-  if (both && fitted->from_surface) {
-    supine_patient_check_size(lungs, low, high, fitted->volume[state], findings);
-  }
-}
-
 static void describe_fit(const supine_patient_record *record, char *text, size_t size) {
   const supine_patient_fit_report *report = &record->report;
   (void)supine_print_text(
@@ -125,9 +113,8 @@ static supine_status take_patient(const supine_patient_record *fitted, supine_pr
   SUPINE_TRY(
       supine_patient_model(record, &p->source.lungs, resting, scan, arrays, &p->model, error));
   tell_volume(record, &p->source.findings);
-  tell_size(fitted, record->shown, &p->source.lungs, &p->source.findings);
-  return supine_patient_check_law(fitted, record->shown, &p->source.lungs.mesh,
-                                  &p->source.findings, error);
+  return supine_patient_check_lungs(fitted, record->shown, &p->source.lungs, &p->source.findings,
+                                    error);
 }
 
 /* Say that the state of the scan is taken from the fit. Refuse a scan whose state the fit does not
@@ -355,8 +342,7 @@ static supine_status complete_scan(const supine_precompute_volumes *volumes,
   const supine_remedy at_rest[SUPINE_REMEDIES_MAX] = {
       supine_remedy_such_as("scanned", "supine:rest", ""), supine_remedy_omit("full")};
   SUPINE_REFUSE_ADVISE(volumes->full != 0.0 && kind != SUPINE_VOLUME_REST, error, at_rest,
-                       SUPINE_ERROR_ARGUMENT,
-                       "the volume at full inflation is for a scan at rest");
+                       SUPINE_ERROR_ARGUMENT, "the volume at full inflation is for a scan at rest");
   scan->full = volumes->full;
   return SUPINE_OK;
 }

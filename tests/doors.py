@@ -125,6 +125,10 @@ for name, basis in (("", lungs), ("other_", other)):
     write_ply(name + "rest.ply", at(basis, STATE), basis.triangles)
     assert command("fit", name + "rest.ply", name + "full.ply", "--rest", STATE, "--other", "supine:full", "-o",
                    name + "patient.json")[0] != "refused"
+write_pairs("pairs.csv", pairs)
+held = lambda vertices: round(np.linalg.det(vertices[lungs.triangles].astype(float)).sum() / 6000)
+assert command("fit", "--landmarks", "pairs.csv", "--rest", f"supine:{held(lungs.vertices)}mL", "--other",
+               f"supine:{held(rest)}mL", "-o", "marks.json")[0] != "refused"
 with open("patient.json", encoding="utf-8") as file:
     patient = file.read()
 with open("other_patient.json", encoding="utf-8") as file:
@@ -311,6 +315,8 @@ DOORS = [
      python(lambda: inside.locate(ROWS_INSIDE, np.loadtxt(x, delimiter=",", skiprows=1, usecols=(1, 2, 3))))),
     ("precompute --patient", "command", "patient",
      lambda x: command("precompute", "full.ply", "--patient", x, "--scanned", "full", *QUICK, "-o", "out.st")),
+    ("precompute SCAN --patient", "command", "scan",  # of landmarks; the scan may be either of the two
+     lambda x: None if "swapped" in x else command("precompute", x, "--patient", "marks.json", *QUICK, "-o", "out.st")),
     ("deform --gravity", "command", "gravity",
      lambda x: command("deform", "lungs.st", "--gravity", x, "-o", "out.ply")),
     ("pose([x, y, z])", "Python", "gravity", lambda x: python(lambda: lungs.pose(numbers(x)))),

@@ -40,16 +40,19 @@ supine_patient_size supine_patient_size_of(const supine_lungs *lungs) {
   return size;
 }
 
+/* Advice for lungs that are not those of the scan of a fit. */
+static const char check_fit[] = "check that the file of the patient was fitted to this scan";
+
 static bool is_told(supine_input_id id, double measured) {
   return supine_input_judge(id, measured) != SUPINE_INPUT_TAKEN;
 }
 
 /* How the measures of one person follow the volume: for each, the line y = slope x through x, the
- * logarithm of emptier / fuller volume of all lungs. Its SD is hypot(floor, sd min(|x|, knee)): people
- * and breaths differ in how much of the first part of a breath lowers the diaphragm or lifts the ribs.
- * Of the spreads of a lung, y is the logarithm of emptier / fuller; of the left lung's share of the
- * volume, their difference. Found by tests/evidence/person.py; the floors, of repeated scans at one
- * volume, and the knee are assumed. */
+ * logarithm of emptier / fuller volume of all lungs. Its SD is hypot(floor, sd min(|x|, knee)):
+ * people and breaths differ in how much of the first part of a breath lowers the diaphragm or lifts
+ * the ribs. Of the spreads of a lung, y is the logarithm of emptier / fuller; of the left lung's
+ * share of the volume, their difference. Found by tests/evidence/person.py; the floors, of repeated
+ * scans at one volume, and the knee are assumed. */
 static const double knee = 0.25;
 static const struct {
   const char *measure;
@@ -137,26 +140,6 @@ supine_status supine_patient_check_landmarks(const char *state, const supine_mes
   (void)supine_lungs_belong_judge(&found, SUPINE_INPUT_LANDMARKS_OUTSIDE, "landmarks", state,
                                   findings);
   return SUPINE_OK;
-}
-
-supine_status supine_patient_check_law(const supine_patient_record *fitted, size_t state,
-                                       const supine_mesh *lungs, supine_findings *findings,
-                                       supine_error *error) {
-  const supine_patient *patient = &fitted->patient;
-  const supine_patient_frame *frame = &patient->frame;
-  SUPINE_ARENA arena = {0};
-  double *points = supine_arena_take(&arena, patient->centre_count + 1, 3 * sizeof *points);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", patient->centre_count));
-  if (fitted->from_surface || state != 0 || patient->centre_count == 0) {
-    return SUPINE_OK;
-  }
-  for (size_t i = 0; i < 3 * patient->centre_count; ++i) {
-    const size_t k = i % 3;
-    points[i] =
-        patient->centre[i / 3].offset[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
-  }
-  return supine_patient_check_landmarks("scan", lungs, patient->centre_count, points, findings,
-                                        error);
 }
 
 /* Return the logarithm of the growth without the pairs of a group (GROUPS: of all pairs).
@@ -310,9 +293,10 @@ void supine_patient_check_volume(const supine_volume *named, double held,
   }
 }
 
-void supine_patient_check_size(const supine_lungs *lungs, const double low[3], const double high[3],
-                               double volume, supine_findings *findings) {
-  const double held = lungs->volume[0] + lungs->volume[1];
+/* Warn if lungs have another width, depth or height than the bounding box of the scan that was
+ * fitted. Return whether they have. */
+static bool tell_box(const supine_lungs *lungs, const double low[3], const double high[3],
+                     supine_findings *findings) {
   double farthest = 1.0;
   const char *side = "";
   for (size_t k = 0; k < 3; ++k) {
@@ -323,15 +307,51 @@ void supine_patient_check_size(const supine_lungs *lungs, const double low[3], c
       side = sides[k];
     }
   }
-  static const char advice[] = "check that the file of the patient was fitted to this scan";
-  if (is_told(SUPINE_INPUT_PATIENT_BOX, fmax(farthest, 1.0 / farthest))) {
+  const bool told = is_told(SUPINE_INPUT_PATIENT_BOX, fmax(farthest, 1.0 / farthest));
+  if (told) {
     supine_findings_warn(findings,
                          "the lungs are %.0f %% as %s as those in the scan that was fitted: %s",
-                         100.0 * farthest, side, advice);
-  } else if (volume > 0.0 &&
-             is_told(SUPINE_INPUT_PATIENT_VOLUME, fmax(held / volume, volume / held))) {
+                         100.0 * farthest, side, check_fit);
+  }
+  return told;
+}
+
+/* Warn if the landmarks of a fit lie outside lungs that show one of its two states. */
+static supine_status check_fitted_landmarks(const supine_patient *patient, size_t state,
+                                            const supine_mesh *lungs, supine_findings *findings,
+                                            supine_error *error) {
+  const supine_patient_frame *frame = &patient->frame;
+  const size_t count = patient->landmark_count;
+  SUPINE_ARENA arena = {0};
+  double *points = supine_arena_take(&arena, count + 1, 3 * sizeof *points);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", count));
+  for (size_t i = 0; i < count; ++i) {
+    double *at = points + 3 * i;
+    for (size_t k = 0; k < 3; ++k) {
+      at[k] = patient->landmark[i].offset[k] + 0.5 * (frame->minimum[k] + frame->maximum[k]);
+    }
+    if (state == 1) {
+      supine_patient_move_to_emptier(patient, patient->landmark[i].side, at);
+    }
+  }
+  return supine_patient_check_landmarks("scan", lungs, count, points, findings, error);
+}
+
+supine_status supine_patient_check_lungs(const supine_patient_record *fitted, size_t state,
+                                         const supine_lungs *lungs, supine_findings *findings,
+                                         supine_error *error) {
+  const supine_patient_frame *frame = &fitted->patient.frame;
+  const double *low = state == 0 ? frame->minimum : fitted->emptier[0];
+  const double *high = state == 0 ? frame->maximum : fitted->emptier[1];
+  const double held = lungs->volume[0] + lungs->volume[1];
+  const double volume = fitted->volume[state];
+  const bool both = lungs->lung_count == 2 && frame->only_side == 0;
+  const bool other_box = both && fitted->from_surface && tell_box(lungs, low, high, findings);
+  if (both && !other_box && volume > 0.0 &&
+      is_told(SUPINE_INPUT_PATIENT_VOLUME, fmax(held / volume, volume / held))) {
     supine_findings_warn(findings,
                          "the lungs hold %.0f mL, but %.0f mL in the scan that was fitted: %s",
-                         held, volume, advice);
+                         held, volume, check_fit);
   }
+  return check_fitted_landmarks(&fitted->patient, state, &lungs->mesh, findings, error);
 }

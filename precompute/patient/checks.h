@@ -10,8 +10,8 @@
 #include "precompute/patient/pairs.h"
 #include "precompute/patient/patient_file.h"
 
-/** Measures of lungs by which the scans of two people can often be told apart: of the left, then the
- * right lung; 0 of a lung that is absent. */
+/** Measures of lungs by which the scans of two people can often be told apart: of the left, then
+ * the right lung; 0 of a lung that is absent. */
 typedef struct supine_patient_size {
   double volume[2];    /**< mL */
   double spread[2][3]; /**< supine_mesh_spread from side to side, front to back, up and down, mm */
@@ -39,13 +39,6 @@ supine_status supine_patient_check_landmarks(const char *state, const supine_mes
                                              size_t count, const double *points,
                                              supine_findings *findings, supine_error *error);
 
-/** Warn if the landmarks of a law that was fitted to landmarks alone lie outside the lungs on which it
- * is put. Nothing is told of a scan of the emptier state, in which their positions are not known.
- * @param state  which state the lungs show: 0 the fuller, 1 the emptier */
-supine_status supine_patient_check_law(const supine_patient_record *fitted, size_t state,
-                                       const supine_mesh *lungs, supine_findings *findings,
-                                       supine_error *error);
-
 /** Return the standard error of the logarithm of supine_patient_pairs_growth, by leaving out each
  * of 20 groups of pairs. */
 double supine_patient_growth_error(const supine_patient_pairs *pairs);
@@ -65,16 +58,17 @@ supine_status supine_patient_check_order(const supine_patient_pairs *pairs, doub
 supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pairs *pairs,
                                              supine_findings *findings, supine_error *error);
 
-/** Warn if a scan holds another volume than its state names. States from rest or full inflation name
- * none.
+/** Warn if a scan holds another volume than its state names. States from rest or full inflation
+ * name none.
  * @param held  volume of the scan, mL; 0 if unknown */
 void supine_patient_check_volume(const supine_volume *named, double held,
                                  supine_findings *findings);
 
-/** Warn if lungs have another size than in the scan of the fit: width, depth, height or volume.
- * @param low, high  bounding box of the scan that was fitted, mm
- * @param volume     its volume, mL, or 0 if unknown */
-void supine_patient_check_size(const supine_lungs *lungs, const double low[3], const double high[3],
-                               double volume, supine_findings *findings);
+/** Warn if lungs are not those of the scan of a fit: by width, depth and height if surfaces were
+ * fitted, by volume, and by the share of the landmarks outside. Of one lung, only landmarks tell.
+ * @param state  which state the lungs show: 0 the fuller, 1 the emptier */
+supine_status supine_patient_check_lungs(const supine_patient_record *fitted, size_t state,
+                                         const supine_lungs *lungs, supine_findings *findings,
+                                         supine_error *error);
 
 #endif

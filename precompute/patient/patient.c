@@ -180,6 +180,17 @@ void supine_patient_find_in_fuller(const supine_patient *patient, const double p
   }
 }
 
+void supine_patient_move_to_emptier(const supine_patient *patient, int side, double point[3]) {
+  const supine_patient_place place = supine_patient_find(&patient->frame, point, side);
+  double u[3];
+  double motion[3];
+  supine_patient_displacement(patient, &place, 1.0, u);
+  supine_patient_motion(&patient->power, &place, motion);
+  for (size_t k = 0; k < 3; ++k) {
+    point[k] += u[k] + motion[k];
+  }
+}
+
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points) {
   for (size_t i = 0; i < count; ++i) {
     double u[3];

@@ -163,6 +163,10 @@ void supine_patient_displacement(const supine_patient *patient, const supine_pat
 void supine_patient_find_in_fuller(const supine_patient *patient, const double point[3], int side,
                                    double force_factor, double at[3], double u[3]);
 
+/** Move a point of the fuller scanned state to its position in the emptier one, mm.
+ * @param side  +1 left lung, -1 right lung, 0 to choose by the side of the midline */
+void supine_patient_move_to_emptier(const supine_patient *patient, int side, double point[3]);
+
 /** Move points [count, 3] of the emptier scanned state to their positions in the fuller one, mm. */
 void supine_patient_points_to_fuller(const supine_patient *patient, size_t count, double *points);
 
