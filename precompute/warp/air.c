@@ -33,13 +33,14 @@ typedef struct binning {
   sums *layers;
 } binning;
 
-/* Add the row of voxels that begins at voxel `first` to the bins of its row. */
-static void add_row(const binning *work, size_t first, size_t bins, sums *sum) {
+/* Add a row of voxels to the bins that begin with bin `bins`. */
+static void add_row(const binning *work, size_t row, size_t bins, sums *sum) {
   const supine_image *ct = work->ct;
+  const size_t first = row * ct->size[0];
   const unsigned char *kind = (const unsigned char *)work->tissue->kind.values + first;
   const size_t lungs = work->tissue->lungs;
   float *air = work->tissue->air.values;
-  for (size_t i = 0; i < ct->size[0]; ++i) {
+  for (size_t i = work->tissue->span[row].begin; i < work->tissue->span[row].end; ++i) {
     if ((kind[i] & SUPINE_TISSUE_LUNG) == 0) {
       continue;
     }
@@ -68,8 +69,8 @@ static void add_layers(void *context, size_t begin, size_t end, size_t thread) {
   for (size_t layer = begin; layer < end; ++layer) {
     for (size_t k = layer * work->bin[2]; k < size[2] && k < (layer + 1) * work->bin[2]; ++k) {
       for (size_t j = 0; j < size[1]; ++j) {
-        add_row(work, size[0] * (j + size[1] * k),
-                air->size[0] * (j / work->bin[1] + air->size[1] * layer), &work->layers[layer]);
+        add_row(work, j + size[1] * k, air->size[0] * (j / work->bin[1] + air->size[1] * layer),
+                &work->layers[layer]);
       }
     }
   }
@@ -183,8 +184,7 @@ supine_status supine_warp_tissue_find_air(const supine_image *ct, supine_tissue 
     const size_t lung = i % SUPINE_LUNGS_MAX;
     tissue->mass[lung] += layer->mass[lung];
     tissue->soft[lung] += layer->soft[lung] * supine_warp_tissue_voxel(ct);
-    tissue->volume[lung] +=
-        (layer->soft[lung] + layer->count[lung]) * supine_warp_tissue_voxel(ct);
+    tissue->volume[lung] += (layer->soft[lung] + layer->count[lung]) * supine_warp_tissue_voxel(ct);
     total.air[lung] += layer->air[lung];
     total.count[lung] += layer->count[lung];
   }

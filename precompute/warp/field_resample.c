@@ -21,6 +21,9 @@ typedef struct tally {
   int64_t aerated[SUPINE_LUNGS_MAX]; /* its part that is proportional to the scale */
 } tally;
 
+/* Rows for each row of a sample. */
+enum { SAMPLE = 8 };
+
 /* Numbers of a tally for 1 HU. A CT has up to 2^30 voxels of up to 2^12 HU. */
 static const double fixed = 256.0;
 
@@ -35,6 +38,7 @@ typedef struct resampling {
   double scale[SUPINE_LUNGS_MAX]; /* factor on the density of aerated tissue, beside the change of
                                      volume */
   bool again;          /* whether only runs in the lungs are processed, with other scales */
+  bool sampling;       /* whether only some rows are processed, and nothing is stored */
   unsigned char *lung; /* [rows, runs] whether the run has voxels of the lungs */
   tally *sums;         /* [threads] */
 } resampling;
@@ -75,44 +79,63 @@ INLINE bool displace(const supine_image *nodes, const cells *in, double (*shift)
   return any;
 }
 
-/* Return the volume of the tissue at a voxel y before the motion, divided by its volume after it.
- * This is det(I + dv/dy) for the inverse field v; return 0 if the field folds at y. */
-static double volume_ratio(const supine_image *nodes, const cells *in, size_t i) {
-  const size_t node = in->first[i] / 3;
-  const supine_warp_cell cell = {{node % nodes->size[0], node / nodes->size[0] % nodes->size[1],
-                                  node / nodes->size[0] / nodes->size[1]},
-                                 {in->share[0][i], in->share[1][i], in->share[2][i]}};
-  return fmax(0.0, supine_warp_stretch(nodes, &cell));
+/* Compute the volume of the tissue at each voxel y in the lungs before the motion, divided by its
+ * volume after it. This is det(I + dv/dy) for the inverse field v; 0 if the field folds at y. */
+INLINE void find_ratios(const supine_image *nodes, const cells *in, const unsigned char *kind,
+                        double *ratio) {
+  const double whole = supine_triple(nodes->step[0], nodes->step[1], nodes->step[2]);
+  const supine_image frame = *nodes;
+  const size_t stride[3] = {3, 3 * frame.size[0], 3 * frame.size[0] * frame.size[1]};
+  vector rise[3][4] = {
+      {{0.0}}}; /* along the four edges of the cell in the direction of each axis */
+  size_t of = SIZE_MAX;
+  for (size_t i = 0; i < RUN; ++i) {
+    double edge[3][3];
+    if ((kind[i] & SUPINE_TISSUE_LUNG) == 0) {
+      continue;
+    }
+    if (in->first[i] != of) {
+      of = in->first[i];
+      for (size_t e = 0; e < 12; ++e) {
+        const size_t k = e / 4;
+        const float *u = (const float *)frame.values + of + (e & 1U) * stride[(k + 1) % 3] +
+                         (e >> 1 & 1U) * stride[(k + 2) % 3];
+        const float *v = u + stride[k];
+        rise[k][e % 4] = __builtin_convertvector((narrow){v[0], v[1], v[2], 0.0F}, vector) -
+                         __builtin_convertvector((narrow){u[0], u[1], u[2], 0.0F}, vector);
+      }
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      const double a = in->share[(k + 1) % 3][i];
+      const double b = in->share[(k + 2) % 3][i];
+      const vector mean = (1.0 - b) * ((1.0 - a) * rise[k][0] + a * rise[k][1]) +
+                          b * ((1.0 - a) * rise[k][2] + a * rise[k][3]);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        edge[k][axis] = frame.step[k][axis] + mean[axis];
+      }
+    }
+    const double stretch = supine_triple(edge[0], edge[1], edge[2]) / whole;
+    ratio[i] = stretch > 0.0 ? stretch : 0.0;
+  }
 }
 
-/* Return the mean density of aerated tissue, HU + 1000, at a place in voxels of the image. */
-static double aerated_at(const resampling *work, const cells *in, double (*corner)[RUN], size_t i,
-                         size_t lung) {
-  const supine_image *air = &work->tissue->air;
-  const float *values = air->values;
-  size_t at[3];
-  double share[3];
+/* Find the mean density of aerated tissue around each voxel, HU + 1000.
+ * @param corner  lowest corner of its cell, voxels */
+INLINE void find_aerated(const resampling *work, const cells *in, double (*corner)[RUN],
+                         const unsigned char *kind, double *air) {
+  double at[3][RUN];
+  cells bins;
   for (size_t a = 0; a < 3; ++a) {
-    const double last = (double)air->size[a] - 1.0;
     const double bin = work->bin[a];
-    const double place = (corner[a][i] + in->share[a][i] - 0.5 * (bin - 1.0)) / bin;
-    const double inner = fmin(fmax(place, 0.0), last);
-    at[a] = (size_t)fmin(floor(inner), fmax(last - 1.0, 0.0));
-    share[a] = inner - (double)at[a];
-  }
-  double sum = 0.0;
-  for (size_t c = 0; c < 8; ++c) {
-    size_t up[3];
-    double weight = 1.0;
-    for (size_t a = 0; a < 3; ++a) {
-      const bool high = (c >> a & 1U) != 0;
-      weight *= high ? share[a] : 1.0 - share[a];
-      up[a] = at[a] + (high && at[a] + 1 < air->size[a] ? 1 : 0);
+    for (size_t i = 0; i < RUN; ++i) {
+      at[a][i] = (corner[a][i] + in->share[a][i] - 0.5 * (bin - 1.0)) / bin;
     }
-    const size_t voxel = up[0] + air->size[0] * (up[1] + air->size[1] * up[2]);
-    sum += weight * (double)values[air->channels * voxel + lung];
   }
-  return sum;
+  find_cells(&work->tissue->air, at, &bins);
+  for (size_t i = 0; i < RUN; ++i) {
+    bins.first[i] += kind[i] & SUPINE_TISSUE_LUNG_INDEX; /* the channel of the lung */
+  }
+  interpolate(&work->tissue->air, &bins, air);
 }
 
 /* Scale the density of a voxel in the lungs, HU + 1000: its soft share keeps its density, and its
@@ -135,16 +158,19 @@ static double scale_density(double density, double air, double ratio, double *ae
  * @param nodes   cells of the field around the voxels of the moved image
  * @param kind    kind of the voxel nearest to the source of each
  * @param values  HU, replaced */
-static void scale_densities(const resampling *work, const cells *nodes, const cells *in,
+INLINE void scale_densities(const resampling *work, const cells *nodes, const cells *in,
                             double (*corner)[RUN], const unsigned char *kind, double *values,
                             tally *sum) {
+  double air[RUN];
+  double ratio[RUN];
+  find_ratios(&work->inverse->nodes, nodes, kind, ratio);
+  find_aerated(work, in, corner, kind, air);
   for (size_t i = 0; i < RUN; ++i) {
     if ((kind[i] & SUPINE_TISSUE_LUNG) != 0) {
       const size_t lung = kind[i] & SUPINE_TISSUE_LUNG_INDEX;
-      const double ratio = work->scale[lung] * volume_ratio(&work->inverse->nodes, nodes, i);
-      const double air = aerated_at(work, in, corner, i, lung);
       double aerated;
-      const double scaled = scale_density(values[i] + 1000.0, air, ratio, &aerated);
+      const double scaled =
+          scale_density(values[i] + 1000.0, air[i], work->scale[lung] * ratio[i], &aerated);
       values[i] = scaled - 1000.0;
       sum->mass[lung] += llrint(fixed * scaled);
       sum->aerated[lung] += llrint(fixed * aerated);
@@ -152,44 +178,70 @@ static void scale_densities(const resampling *work, const cells *nodes, const ce
   }
 }
 
-/* Interpolate densities, HU. A point is interpolated only from corners of its cell that are in the
- * lungs, or not, as its nearest corner is. The chest wall thus adds no mass to the lungs.
- * @param nearest  set to the kind of the nearest corner
- * Return whether a point is in the lungs. */
-INLINE bool interpolate_density(const resampling *work, const cells *in, double *values,
-                                unsigned char *nearest) {
-  double weight[8][RUN];
-  double value[RUN];
-  unsigned char kind[8][RUN];
-  double sum[RUN] = {0.0};
-  size_t offset[8];
+/* Take the kind of the first corner of the cell of each point. Return whether one is in the lungs,
+ * or near to their border. */
+INLINE bool take_kinds(const resampling *work, const cells *in, unsigned char *kind) {
+  const unsigned char *of = work->tissue->kind.values;
   unsigned char any = 0;
-  weigh_corners(work->from, in, weight, offset);
+  for (size_t i = 0; i < RUN; ++i) {
+    kind[i] = of[in->first[i]];
+    any |= kind[i];
+  }
+  return any != 0;
+}
+
+/* Interpolate the density of a point at the border of the lungs, HU, only from corners of its cell
+ * that are in the lungs, or not, as its nearest corner is. The chest wall thus adds no mass to the
+ * lungs. Set `kind` to that of the nearest corner. */
+static void interpolate_side(const resampling *work, const cells *in, size_t i, double *value,
+                             unsigned char *kind) {
+  const unsigned char *of = work->tissue->kind.values;
+  double sum[2] = {0.0, 0.0}; /* of the weights, and of the values times their weights */
+  size_t at[8];
+  size_t nearest = 0;
   for (size_t corner = 0; corner < 8; ++corner) {
-    for (size_t i = 0; i < RUN; ++i) {
-      kind[corner][i] =
-          ((const unsigned char *)work->tissue->kind.values)[in->first[i] + offset[corner]];
+    size_t stride = 1;
+    at[corner] = in->first[i];
+    for (size_t a = 0; a < 3; ++a) {
+      at[corner] += (corner >> a & 1U) != 0 && work->from->size[a] > 1 ? stride : 0;
+      stride *= work->from->size[a];
     }
   }
-  for (size_t i = 0; i < RUN; ++i) {
-    nearest[i] = kind[(in->share[0][i] > 0.5) + 2 * (in->share[1][i] > 0.5) +
-                      4 * (in->share[2][i] > 0.5)][i];
-    any |= nearest[i];
+  for (size_t a = 0; a < 3; ++a) {
+    nearest += in->share[a][i] > 0.5 ? (size_t)1 << a : 0;
   }
-  memset(values, 0, RUN * sizeof *values);
+  *kind = of[at[nearest]];
   for (size_t corner = 0; corner < 8; ++corner) {
-    supine_image_gather(work->from, offset[corner], in->first, RUN, value);
-    for (size_t i = 0; i < RUN; ++i) {
-      const bool same = ((kind[corner][i] ^ nearest[i]) & SUPINE_TISSUE_LUNG) == 0;
-      const double part = same ? weight[corner][i] : 0.0;
-      values[i] += part * value[i];
-      sum[i] += part;
+    double weight = ((of[at[corner]] ^ *kind) & SUPINE_TISSUE_LUNG) == 0 ? 1.0 : 0.0;
+    for (size_t a = 0; a < 3; ++a) {
+      weight *= (corner >> a & 1U) != 0 ? in->share[a][i] : 1.0 - in->share[a][i];
     }
+    sum[0] += weight;
+    sum[1] += weight * supine_image_get(work->from, at[corner]);
   }
-  for (size_t i = 0; i < RUN; ++i) {
-    values[i] /= sum[i];
+  *value = sum[1] / sum[0];
+}
+
+/* Interpolate and scale densities, HU. Return whether a point is in the lungs or at their border.
+ */
+INLINE bool take_densities(const resampling *work, const cells *nodes, const cells *in,
+                           double (*corner)[RUN], size_t count, double *values, tally *sum) {
+  unsigned char kind[RUN];
+  const bool lung = take_kinds(work, in, kind);
+  if (work->sampling && !lung) {
+    return false;
   }
-  return (any & SUPINE_TISSUE_LUNG) != 0;
+  interpolate(work->from, in, values);
+  if (lung) {
+    for (size_t i = 0; i < RUN; ++i) {
+      if ((kind[i] & SUPINE_TISSUE_BORDER) != 0) {
+        interpolate_side(work, in, i, &values[i], &kind[i]);
+      }
+    }
+    memset(kind + count, 0, RUN - count); /* the sums are over voxels of the image only */
+    scale_densities(work, nodes, in, corner, kind, values, sum);
+  }
+  return lung;
 }
 
 /* Return whether one of `count` voxels of the image belongs to the lungs. */
@@ -214,7 +266,6 @@ SUPINE_CLONES static bool resample_run(const resampling *work, size_t row, size_
   double at[3][RUN];
   double shift[3][RUN];
   double values[RUN];
-  unsigned char kind[RUN];
   bool lung = false;
   cells nodes;
   cells in;
@@ -236,16 +287,20 @@ SUPINE_CLONES static bool resample_run(const resampling *work, size_t row, size_
   if (work->labels) {
     take_nearest(from, in, values);
   } else if (work->tissue != NULL) {
-    lung = interpolate_density(work, &in, values, kind);
-    if (lung) {
-      memset(kind + count, 0, RUN - count); /* the sums are over voxels of the image only */
-      scale_densities(work, &nodes, &in, at, kind, values, sum);
-    }
+    lung = take_densities(work, &nodes, &in, at, count, values, sum);
   } else {
     interpolate(from, &in, values);
   }
-  supine_image_put(work->to, first, count, values);
+  if (!work->sampling) {
+    supine_image_put(work->to, first, count, values);
+  }
   return lung;
+}
+
+/* Return whether a row is one of the SAMPLE-th part of all that stands for them: of a lattice
+ * across the rows in which each has neighbours at about the same distance on all sides. */
+static bool is_sample(const supine_image *image, size_t row) {
+  return (row % image->size[1] + 3 * (row / image->size[1])) % SAMPLE == 0;
 }
 
 static void resample_rows(void *context, size_t begin, size_t end, size_t thread) {
@@ -254,6 +309,9 @@ static void resample_rows(void *context, size_t begin, size_t end, size_t thread
   tally unused;
   tally *sum = work->sums != NULL ? &work->sums[thread] : &unused;
   for (size_t row = begin; row < end; ++row) {
+    if (work->sampling && !is_sample(work->from, row)) {
+      continue;
+    }
     for (size_t i = 0; i < runs; ++i) {
       if (!work->again || work->lung[row * runs + i] != 0) {
         const bool lung = resample_run(work, row, RUN * i, sum);
@@ -273,13 +331,14 @@ static bool correct_scales(resampling *work, size_t threads) {
    * consolidated lung is compressed; beyond, the image does not contain the whole lung. */
   static const double low = 0.8;
   static const double high = 1.25;
+  const double parts = work->sampling ? SAMPLE : 1.0;
   bool changed = false;
   for (size_t lung = 0; lung < work->tissue->lungs; ++lung) {
     double mass = 0.0;
     double aerated = 0.0;
     for (size_t t = 0; t < threads; ++t) {
-      mass += (double)work->sums[t].mass[lung] / fixed;
-      aerated += (double)work->sums[t].aerated[lung] / fixed;
+      mass += parts * (double)work->sums[t].mass[lung] / fixed;
+      aerated += parts * (double)work->sums[t].aerated[lung] / fixed;
     }
     if (aerated > 0.0) {
       const double missing = (work->tissue->mass[lung] - mass) / aerated;
@@ -292,7 +351,7 @@ static bool correct_scales(resampling *work, size_t threads) {
 }
 
 /* Resample an image of densities. A pass computes the lungs' masses, from which the scales of the
- * next follow; a third is needed only where many voxels reach the density of soft tissue. */
+ * next follow. The first passes take a sample of the rows, until the scales have settled. */
 static supine_status resample_densities(resampling *work, supine_error *error) {
   enum { PASSES = 3 };
   const size_t rows = work->from->size[1] * work->from->size[2];
@@ -305,12 +364,15 @@ static supine_status resample_densities(resampling *work, supine_error *error) {
   for (size_t a = 0; a < 3; ++a) {
     work->bin[a] = supine_length(work->tissue->air.step[a]) / supine_length(work->from->step[a]);
   }
-  for (int pass = 0; pass < PASSES; ++pass) {
-    memset(work->sums, 0, threads * sizeof *work->sums);
-    work->again = pass > 0;
-    supine_parallel_for(rows, 1, threads, resample_rows, work);
-    if (!correct_scales(work, threads)) {
-      break;
+  for (int sampling = 1; sampling >= 0; --sampling) {
+    work->sampling = sampling == 1;
+    for (int pass = 0; pass < PASSES; ++pass) {
+      memset(work->sums, 0, threads * sizeof *work->sums);
+      work->again = pass > 0;
+      supine_parallel_for(rows, 1, threads, resample_rows, work);
+      if (!correct_scales(work, threads)) {
+        break;
+      }
     }
   }
   return SUPINE_OK;

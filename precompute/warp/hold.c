@@ -229,15 +229,17 @@ static void follow_rows(void *context, size_t begin, size_t end, size_t thread) 
 static void add_volumes(const supine_field *field, double sign, double *volume) {
   const supine_image *nodes = &field->nodes;
   const double whole = supine_warp_tissue_voxel(nodes);
+  const double reach = supine_image_cell_diagonal(nodes); /* corners differ in depth by less */
   for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
     const supine_warp_cell cell = {{i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
                                     i / nodes->size[0] / nodes->size[1]},
                                    {0.5, 0.5, 0.5}};
-    double depth = -1.0;
-    if (cell.corner[0] + 1 < nodes->size[0] && cell.corner[1] + 1 < nodes->size[1] &&
-        cell.corner[2] + 1 < nodes->size[2]) {
-      supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
+    double depth = (double)((const float *)field->depth.values)[i];
+    if (depth < -reach || cell.corner[0] + 1 >= nodes->size[0] ||
+        cell.corner[1] + 1 >= nodes->size[1] || cell.corner[2] + 1 >= nodes->size[2]) {
+      continue;
     }
+    supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
     if (depth > 0.0) {
       volume[((const unsigned char *)field->lung.values)[i]] +=
           sign * whole * supine_warp_stretch(nodes, &cell);

@@ -479,6 +479,7 @@ void supine_warp_tissue_free(supine_tissue *tissue) {
   }
   free(tissue->parts);
   free(tissue->gap);
+  free(tissue->span);
   supine_image_free(&tissue->kind);
   supine_image_free(&tissue->air);
   *tissue = (supine_tissue){0};

@@ -22,21 +22,29 @@ typedef struct supine_warp_part {
   double *outline; /**< [outline_count, 3] some of the voxels at its surface, mm */
 } supine_warp_part;
 
-/** What the value of a voxel in `kind` means. */
+/** What the value of a voxel in `kind` means; 0 if the voxel belongs to no lung and touches none.
+ */
 enum {
-  SUPINE_TISSUE_LUNG_INDEX = 15, /* mask of the index of the nearest lung */
-  SUPINE_TISSUE_LUNG = 16        /* the voxel belongs to this lung */
+  SUPINE_TISSUE_LUNG_INDEX = 15, /* mask of the index of the lung */
+  SUPINE_TISSUE_LUNG = 16,       /* the voxel belongs to this lung */
+  SUPINE_TISSUE_BORDER = 32 /* the eight voxels of the cell that begins here are of two kinds */
 };
+
+/** Voxels begin <= i < end of a row of an image. */
+typedef struct supine_warp_span {
+  size_t begin, end;
+} supine_warp_span;
 
 /** Soft tissue in a CT, and what is needed to scale the densities of the lungs around it.
  * Zero-initialise; supine_warp_tissue_free releases it. */
 typedef struct supine_tissue {
-  supine_image kind; /**< U8 for each voxel of the image; values NULL if there is no CT */
-  supine_image air;  /**< F32, a channel for each lung: mean of HU + 1000 of the aerated tissue
-                        around a point, on a grid of about 4 mm */
+  supine_image kind;      /**< U8 for each voxel of the image; values NULL if there is no CT */
+  supine_warp_span *span; /**< [rows] where voxels of each row may be of the lungs; others are 0 */
+  supine_image air;       /**< F32, a channel for each lung: mean of HU + 1000 of the aerated tissue
+                             around a point, on a grid of about 4 mm */
   size_t lungs;
-  double mass[SUPINE_LUNGS_MAX]; /**< sum of HU + 1000 over the voxels of each lung */
-  double soft[SUPINE_LUNGS_MAX]; /**< voxels of each lung that are not aerated, mL */
+  double mass[SUPINE_LUNGS_MAX];   /**< sum of HU + 1000 over the voxels of each lung */
+  double soft[SUPINE_LUNGS_MAX];   /**< voxels of each lung that are not aerated, mL */
   double volume[SUPINE_LUNGS_MAX]; /**< all voxels of each lung, mL */
   size_t part_count;
   supine_warp_part *parts;
@@ -90,7 +98,7 @@ supine_status supine_warp_tissue_hold(const supine_tissue *tissue, supine_field 
                                       supine_error *error);
 
 /* Internal: make the voxels soft that are not, but are enclosed by soft ones (cavities.c). */
-supine_status supine_warp_tissue_fill(supine_image *kind, supine_error *error);
+supine_status supine_warp_tissue_fill(supine_tissue *tissue, supine_error *error);
 /* Internal: find the compact parts among the voxels of `kind` that are soft (parts.c). */
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error);
 /* Internal: put parts that are close to each other into groups, and find the gaps between groups.
@@ -123,7 +131,8 @@ static inline double supine_warp_tissue_soft_share(double density, double air) {
    * the emptied lung, and a ramp between two fixed densities 10 mL. */
   static const double spread = 1.25;
   const double share = (density - spread * air) / (supine_warp_tissue_density - spread * air);
-  return fmin(fmax(share, 0.0), 1.0);
+  const double above = share > 0.0 ? share : 0.0; /* comparisons become vector instructions */
+  return above < 1.0 ? above : 1.0;
 }
 
 #endif
