@@ -18,9 +18,9 @@ pictures=""
 if "$supine" render "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" --posture supine,left,prone \
   -o "$folder/postures.png" &&
   "$supine" render "$folder/lungs.safetensors" --inside "$folder/inside.safetensors" \
-    --posture supine,left,prone,supine --size 600x400 -o "$folder/postures.webp"; then
+    --posture supine,left,prone,supine --size 600x440 -o "$folder/postures.webp"; then
   pictures="  postures.png         three postures side by side
-  postures.webp        a film: the lungs turn from the back to the left side and the belly, and back"
+  postures.webp        a film: the lungs turn from the back to the left side and the belly, and back, beside those on the back"
 fi
 cat <<END
 

@@ -71,7 +71,7 @@ static const supine_option table[] = {
      FILLS(output), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".png, .pdf, .svg or .webp"},
     {"size", 0, "WxH",
-     "size of the whole picture, in pixels; default 440 x 480 for each posture and view, plus "
+     "size of the whole picture, in pixels; default 440 x 540 for each posture and view, plus "
      "margins",
      FILLS(size), .read = read_size, .wants = "WIDTHxHEIGHT, up to 16384 each"},
     {"view", 0, "LIST",
@@ -121,8 +121,9 @@ const supine_command supine_command_render = {
         "with what is inside. The target that moves most, in multiples of its expected error, "
         "is orange: a dashed circle shows where it was, an arrow how it moves, and a ring within "
         "which distance of its ball it is expected (RMS). Other targets are teal; up to eight are "
-        "named. Airways, lobes and other large structures have a colour each. No display is "
-        "needed. In views other than 'lying', and in the look 'displacement', a ball shows the "
+        "named. Airways, lobes and other large structures have a colour each. A film of postures "
+        "turns from one to the next; the first stays beside it. No display is needed. In views "
+        "other than 'lying', and in the look 'displacement', a ball shows the "
         "body's axes (left, right, anterior, posterior, head, feet) and gravity: an arrow, a dot "
         "if it points towards you, or a cross if it points away from you.",
     .options = table,

@@ -17,7 +17,7 @@
 #include "program/options/inside.h"
 
 static const char name[] = "render";
-static const double turn_seconds = 1.2; /* duration of a turn between two postures of a list, s */
+static const double turn_seconds = 1.0; /* duration of a turn between two postures of a list, s */
 
 enum { FPS = 15, FRAMES_MAX = 10000, STOP_MS = 1000 };
 
@@ -248,7 +248,7 @@ static supine_picture make_picture(studio *s) {
                           .look = wanted->look,
                           .width = wanted->size[0] != 0 ? wanted->size[0] : 20 + 440 * count,
                           .height = wanted->size[1] != 0 ? wanted->size[1]
-                                                         : 120 + 480 * wanted->view_count};
+                                                         : 140 + 540 * wanted->view_count};
 }
 
 /* Compute and mark all panels. */
@@ -279,11 +279,12 @@ static supine_status draw_postures(studio *s, supine_error *error) {
   return SUPINE_OK;
 }
 
-/* Compute a frame of a film, and fill its only panel. */
+/* Compute a frame of a film, and fill the panel that moves: the last one. */
 static supine_status find_frame(studio *s, const frame *shown, bool tell, supine_error *error) {
-  s->postures.item[0].state = shown->state;
-  SUPINE_TRY(fill_panel(s, 0, tell, error));
-  s->panel[0].title = shown->title;
+  const size_t moving = s->postures.count - 1;
+  s->postures.item[moving].state = shown->state;
+  SUPINE_TRY(fill_panel(s, moving, tell, error));
+  s->panel[moving].title = shown->title;
   return SUPINE_OK;
 }
 
@@ -293,9 +294,13 @@ static supine_status add_frames(studio *s, const film *shot, const double (*exte
                                 supine_animation *animation, supine_error *error) {
   SUPINE_FREED_BY(supine_options_progress_end)
   supine_progress progress = supine_options_progress_begin(name);
+  const size_t moving = s->postures.count - 1;
+  for (size_t i = 0; i < moving; ++i) {
+    SUPINE_TRY(mark_panel(s, i, error));
+  }
   for (size_t i = 0; i < shot->count; ++i) {
     SUPINE_TRY(find_frame(s, &shot->frame[i], false, error));
-    SUPINE_TRY(mark_panel(s, 0, error));
+    SUPINE_TRY(mark_panel(s, moving, error));
     write_legend(s);
     supine_picture picture = make_picture(s);
     picture.extent = extent;
@@ -325,9 +330,14 @@ static supine_status draw_film(studio *s, const film *shot, supine_error *error)
       s->view[0] = SUPINE_VIEW_ANTERIOR; /* the camera of a patient who gets up stays where it is */
     }
   }
+  const size_t moving = s->postures.count - 1;
+  for (size_t i = 0; i < moving; ++i) {
+    SUPINE_TRY(fill_panel(s, i, true, error));
+    SUPINE_TRY(score_panel(s, i, error));
+  }
   for (size_t i = 0; i < shot->count; ++i) {
     SUPINE_TRY(find_frame(s, &shot->frame[i], shot->frame[i].ms == STOP_MS, error));
-    SUPINE_TRY(score_panel(s, 0, error));
+    SUPINE_TRY(score_panel(s, moving, error));
     const supine_picture picture = make_picture(s);
     supine_render_picture_extent(s->basis, &picture, extent);
   }
@@ -454,6 +464,8 @@ static supine_status film_draw(studio *s, const char *path, supine_error *error)
     add_turn(&shot, &wanted->turn, &wanted->volume.state, NULL);
   } else if (wanted->breath == 0.0) {
     SUPINE_TRY(turn_through(&stops, &shot, error));
+    s->postures.item[0] = stops.item[0]; /* which stays beside the lungs that turn */
+    s->postures.count = 2;
   }
   SUPINE_TRY(open_studio(s, path, error));
   if (wanted->breath > 0.0) {

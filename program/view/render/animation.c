@@ -8,8 +8,8 @@
 #include "base/arena.h"
 #include "program/view/render/render.h"
 
-/* WebP quality, 0 to 100. At 82, letters are sharp and files take a fifth of the lossless size. */
-static const float quality = 82.0F;
+/* WebP quality, 0 to 100. At 78, letters are sharp and files take a fifth of the lossless size. */
+static const float quality = 78.0F;
 enum { EFFORT = 4, SIDE_MAX = 16383 };
 
 struct supine_animation {

@@ -365,9 +365,17 @@ static void card(const painter *by, double x, double y) {
   cairo.stroke(by->cr);
 }
 
+/* Widen an extent on its left, so that the lungs are right of the middle of a box {x, y, width,
+ * height} by an eighth of its width, if they fit there at the same scale. */
+static void move_aside(const double box[4], double extent[4]) {
+  const double width = (extent[3] - extent[2]) * box[2] / box[3]; /* of the box, mm */
+  const double free = fmax(0.0, width - (extent[1] - extent[0]));
+  extent[0] -= fmin(free, 2.0 / 8.0 * width);
+}
+
 /* Draw the cell of the picture that shows the posture `column` from the view `row`. Shells touch
- * each other, and gravity points down in them if they are seen as the patient lies; values have
- * cards, with a ball that shows gravity. */
+ * each other, and gravity points down in them if they are seen as the patient lies; in wide cells
+ * the lungs are beside the heading. Values have cards, with a ball that shows gravity. */
 static supine_status cell(const painter *by, size_t column, size_t row, const double extent[4],
                           supine_error *error) {
   const layout *at = &by->at;
@@ -381,14 +389,20 @@ static supine_status cell(const painter *by, size_t column, size_t row, const do
   const double radius = at->heading_height * 0.4;
   const bool ball_shown = !shell || view != SUPINE_VIEW_LYING;
   const double words = x + at->font + (ball_shown ? 2 * radius + 0.5 * at->font : 0.0);
-  const double room = x + at->cell_width - words - 0.5 * at->font;
+  const bool wide = shell && at->cell_width > at->cell_height;
+  const double room = x + (wide ? 0.5 : 1.0) * at->cell_width - words - 0.5 * at->font;
   const double side = shell ? 0.0 : 0.5 * at->font; /* space beside and below the lungs */
-  const double box[4] = {x + side, y + at->heading_height, at->cell_width - 2 * side,
-                         at->cell_height - at->heading_height - side};
+  const double above = wide ? 0.5 * at->font : at->heading_height;
+  const double box[4] = {x + side, y + above, at->cell_width - 2 * side,
+                         at->cell_height - above - side};
+  double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
   if (!shell) {
     card(by, x, y);
   }
-  SUPINE_TRY(lungs(by, panel, view, box, extent, error));
+  if (wide) {
+    move_aside(box, shown);
+  }
+  SUPINE_TRY(lungs(by, panel, view, box, shown, error));
   if (ball_shown) {
     ball(by, x + radius + at->font * 0.7, y + at->heading_height / 2 + at->font * 0.2, radius, view,
          panel->gravity);
