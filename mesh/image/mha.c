@@ -36,15 +36,16 @@ typedef struct header {
   size_t count;
   const char **key, **value;
   size_t length; /* bytes before the voxels */
+  bool contrary; /* whether two lines that were asked for state different values */
 } header;
 
-/* Return the last value with one of three keys, or "" if there is none. Unused keys are "". */
-static const char *value_of(const header *h, const char *key, const char *second,
-                            const char *third) {
+/* Return the value with one of three keys, or "" if there is none. Unused keys are "". */
+static const char *value_of(header *h, const char *key, const char *second, const char *third) {
   const char *value = "";
   for (size_t i = 0; i < h->count; ++i) {
     if (strcmp(h->key[i], key) == 0 || strcmp(h->key[i], second) == 0 ||
         strcmp(h->key[i], third) == 0) {
+      h->contrary = h->contrary || (*value != '\0' && strcmp(value, h->value[i]) != 0);
       value = h->value[i];
     }
   }
@@ -69,7 +70,7 @@ static bool numbers(const char *text, double *values, size_t count) {
 
 /* Find the distances between voxels, in the unit of the file. Like MetaIO, take the sizes of voxels
  * for them if they are not stated. Return NULL, or a message if neither is stated. */
-static const char *find_spacing(const header *h, size_t count, double *spacing) {
+static const char *find_spacing(header *h, size_t count, double *spacing) {
   const char *text = value_of(h, "ElementSpacing", "", "");
   text = *text != '\0' ? text : value_of(h, "ElementSize", "", "");
   if (*text == '\0') {
@@ -122,7 +123,7 @@ static const char *read_header(char *text, header *h) {
 }
 
 /* Check that the voxels are binary numbers in this file; return NULL, or a message on failure. */
-static const char *check(const header *h) {
+static const char *check(header *h) {
   const char *object = value_of(h, "ObjectType", "", "");
   const char *binary = value_of(h, "BinaryData", "", "");
   if (*object != '\0' && !supine_ascii_same(object, "Image")) {
@@ -155,7 +156,7 @@ static void set_steps(supine_image *image, const double *spacing, const double *
 }
 
 /* Find the image's size, position, axes and type; return NULL, or a message on failure. */
-static const char *describe(const header *h, supine_image *image, size_t *type_index) {
+static const char *describe(header *h, supine_image *image, size_t *type_index) {
   const char *name = value_of(h, "ElementType", "", "");
   const char *unit = value_of(h, "DistanceUnits", "", "");
   double millimetres = 1.0; /* of the unit */
@@ -237,6 +238,9 @@ supine_status supine_image_describe_mha(const char *path, FILE *file, supine_ima
       .packed = is_true(value_of(&h, "CompressedData", "", "")),
       .big_endian = is_true(value_of(&h, "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "")),
       .integer = integer};
+  if (wrong == NULL && h.contrary) {
+    wrong = "its header states one thing twice, with different values; save the image again";
+  }
   SUPINE_REFUSE_IF(wrong != NULL, error, SUPINE_ERROR_FORMAT, "%s: %s", path, wrong);
   return SUPINE_OK;
 }

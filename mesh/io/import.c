@@ -2,6 +2,7 @@
 /* Run the import library assimp in a process of its own. On a corrupt file, an importer may crash,
  * leak memory, or exceed its limits of time and memory. Then only that process ends. */
 #include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -526,6 +527,80 @@ supine_status supine_io_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dro
   } else {
     SUPINE_TRY(tidy_binary_stl(file, error));
   }
+  return supine_io_import(file, mesh, dropped, error);
+}
+
+/* Refuse a text that holds more or fewer of something than it counts: importers lose the rest. */
+static supine_status compare_counts(const char *path, uint64_t counted, uint64_t held,
+                                    const char *what, supine_error *error) {
+  SUPINE_REFUSE_IF(counted != held, error, SUPINE_ERROR_FORMAT,
+                   "%s: it counts %" PRIu64 " %s, but it holds %" PRIu64
+                   ": save it again, so that no part of the surface is lost",
+                   path, counted, what, held);
+  return SUPINE_OK;
+}
+
+/* Remove the next line from `text` that has words besides a comment; set `line` to it without the
+ * comment, or return false at the end. */
+static bool next_off_line(mesh_text *text, mesh_text *line) {
+  while (supine_io_text_line(text, line)) {
+    const size_t length = (size_t)(line->end - line->at);
+    const unsigned char *mark = length > 0 ? memchr(line->at, '#', length) : NULL;
+    line->end = mark != NULL ? mark : line->end;
+    mesh_text rest = *line;
+    mesh_text word;
+    if (supine_io_text_word(&rest, &word)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Read OFF: a word that ends in OFF, the numbers of vertices, faces and edges, and a line for each
+ * vertex and each face. */
+supine_status supine_io_read_off(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                 supine_error *error) {
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text line = {0};
+  mesh_text word;
+  uint64_t counts[3] = {0};
+  uint64_t lines = 0;
+  size_t known = 0;
+  SUPINE_TRY(supine_io_guard_text(file, error));
+  while (known < 3 && next_off_line(&text, &line)) {
+    while (known < 3 && supine_io_text_word(&line, &word)) {
+      known += supine_io_text_count(word, &counts[known]) ? 1 : 0;
+    }
+  }
+  while (next_off_line(&text, &line)) {
+    ++lines;
+  }
+  SUPINE_TRY(compare_counts(file->path, counts[0] + counts[1], lines, "lines of vertices and faces",
+                            error));
+  return supine_io_import(file, mesh, dropped, error);
+}
+
+/* Read AC3D, in which each object counts its surfaces after the word numsurf, and each surface
+ * begins with the word SURF. */
+supine_status supine_io_read_ac(mesh_file *file, supine_mesh *mesh, size_t *dropped,
+                                supine_error *error) {
+  mesh_text text = {file->bytes, file->bytes + file->size};
+  mesh_text line;
+  uint64_t counted = 0;
+  uint64_t held = 0;
+  while (supine_io_text_line(&text, &line)) {
+    mesh_text word;
+    uint64_t count = 0;
+    if (!supine_io_text_word(&line, &word)) {
+      continue;
+    }
+    held += supine_io_text_is(word, "SURF") ? 1 : 0;
+    if (supine_io_text_is(word, "numsurf") && supine_io_text_word(&line, &word) &&
+        supine_io_text_count(word, &count)) {
+      counted += count;
+    }
+  }
+  SUPINE_TRY(compare_counts(file->path, counted, held, "surfaces", error));
   return supine_io_import(file, mesh, dropped, error);
 }
 

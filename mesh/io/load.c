@@ -19,10 +19,9 @@ static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
     mesh_reader *read;
-  } known[] = {{".ply", supine_io_read_ply},
-               {".vtp", supine_io_read_vtp},
-               {".stl", supine_io_read_stl},
-               {".obj", supine_io_read_obj}};
+  } known[] = {{".ply", supine_io_read_ply}, {".vtp", supine_io_read_vtp},
+               {".stl", supine_io_read_stl}, {".obj", supine_io_read_obj},
+               {".off", supine_io_read_off}, {".ac", supine_io_read_ac}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     if (supine_text_ends_in(path, known[i].ending)) {
       return known[i].read;
@@ -57,25 +56,14 @@ static void find_space(mesh_file *file) {
   }
 }
 
-/* Copy the value of an attribute of the first element `tag` in the first 4095 bytes of a file; ""
- * if it has none. */
+/* Copy the value of an attribute of the first element `tag` of a file; "" if it has none. */
 static void find_attribute(const mesh_file *file, const char *tag, const char *name,
                            char value[32]) {
-  char head[4096];
-  char wanted[32];
-  (void)snprintf(head, sizeof head, "%s", (const char *)file->bytes);
-  (void)snprintf(wanted, sizeof wanted, " %s=", name);
-  char *element = strstr(head, tag);
-  char *end = element != NULL ? strchr(element, '>') : NULL;
-  value[0] = '\0';
-  if (end != NULL) {
-    *end = '\0';
-    const char *at = strstr(element, wanted);
-    at = at != NULL ? at + strlen(wanted) : "";
-    if (*at == '"' || *at == '\'') {
-      (void)snprintf(value, 32, "%.*s", (int)strnlen(at + 1, 31), at + 1);
-      value[strcspn(value, "\"'")] = '\0';
-    }
+  const char *text = (const char *)file->bytes;
+  mesh_element element;
+  if (!supine_io_element_find(text, text + file->size, tag, &element) ||
+      !supine_io_element_attribute(&element, name, value, 32)) {
+    value[0] = '\0';
   }
 }
 
@@ -90,11 +78,11 @@ static supine_status find_unit(mesh_file *file, supine_error *error) {
   char text[32];
   char *end = NULL;
   if (supine_text_ends_in(file->path, ".dae")) {
-    find_attribute(file, "<unit", "meter", text);
+    find_attribute(file, "unit", "meter", text);
     const double metres = supine_number_parse(text, &end);
     file->millimetres = end != text && metres > 0.0 && metres != 1.0 ? 1000.0 : 0.0;
   } else if (supine_text_ends_in(file->path, ".amf")) {
-    find_attribute(file, "<amf", "unit", text);
+    find_attribute(file, "amf", "unit", text);
     for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
       if (supine_ascii_same(text, names[i].name)) {
         file->millimetres = names[i].millimetres;

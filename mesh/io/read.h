@@ -45,6 +45,20 @@ const mesh_type *supine_io_type_find(mesh_text name);
 /** Convert the bytes of a number to double. */
 double supine_io_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian);
 
+/* ---- xml.c: find elements and attributes in the text of an XML file, which a NUL follows. ---- */
+
+typedef struct mesh_element {
+  const char *at, *end; /**< begin and end of the element's attributes */
+  const char *body;     /**< first byte after the > of the tag */
+} mesh_element;
+
+/** Find the first element called `name` between `from` and `to`, outside comments; return false if
+ * there is none. */
+bool supine_io_element_find(const char *from, const char *to, const char *name,
+                            mesh_element *found);
+/** Copy the value of an attribute, truncated to `size` bytes; return false if it is missing. */
+bool supine_io_element_attribute(const mesh_element *e, const char *name, char *value, size_t size);
+
 typedef struct mesh_file {
   const char *path;
   unsigned char *bytes; /**< content of the file, then a NUL */
@@ -91,6 +105,8 @@ mesh_reader supine_io_read_ply;
 mesh_reader supine_io_read_vtp;
 mesh_reader supine_io_read_stl;
 mesh_reader supine_io_read_obj;
+mesh_reader supine_io_read_off;
+mesh_reader supine_io_read_ac;
 /** Read any other format with the library assimp. */
 mesh_reader supine_io_import;
 /** Return whether assimp is installed and imports files whose names have this ending. */

@@ -21,49 +21,9 @@ typedef struct vtp_file {
   size_t header_size; /* size of each integer in an array's header, bytes: 4 or 8 */
 } vtp_file;
 
-typedef struct element {
-  const char *at, *end; /* begin and end of the element's attributes */
-  const char *body;     /* first byte after the > of the tag */
-} element;
-
-/* Find the first element called `name` between `from` and `to`; return false if there is none. */
-static bool find_element(const char *from, const char *to, const char *name, element *found) {
-  const size_t length = strlen(name);
-  for (const char *at = from; at < to && (at = memchr(at, '<', (size_t)(to - at))) != NULL; ++at) {
-    if ((size_t)(to - at) > length + 1 && strncmp(at + 1, name, length) == 0 &&
-        (supine_ascii_is_space(at[1 + length]) || strchr("/>", at[1 + length]) != NULL)) {
-      const char *end = memchr(at, '>', (size_t)(to - at));
-      if (end == NULL) {
-        return false;
-      }
-      *found = (element){at + 1 + length, end, end + 1};
-      return true;
-    }
-  }
-  return false;
-}
-
-/* Copy the value of an attribute, truncated to `size` bytes; return false if it is missing. */
-static bool attribute(const element *e, const char *name, char *value, size_t size) {
-  const size_t length = strlen(name);
-  for (const char *at = e->at; at + length + 2 < e->end; ++at) {
-    if (supine_ascii_is_space(at[-1]) && strncmp(at, name, length) == 0 && at[length] == '=' &&
-        (at[length + 1] == '"' || at[length + 1] == '\'')) {
-      const char *from = at + length + 2;
-      const char *to = memchr(from, at[length + 1], (size_t)(e->end - from));
-      if (to == NULL) {
-        return false;
-      }
-      (void)snprintf(value, size, "%.*s", (int)(to - from < 256 ? to - from : 256), from);
-      return true;
-    }
-  }
-  return false;
-}
-
-static bool is_attribute(const element *e, const char *name, const char *wanted) {
+static bool is_attribute(const mesh_element *e, const char *name, const char *wanted) {
   char value[64];
-  return attribute(e, name, value, sizeof value) && strcmp(value, wanted) == 0;
+  return supine_io_element_attribute(e, name, value, sizeof value) && strcmp(value, wanted) == 0;
 }
 
 /* Read a little-endian number of `size` bytes. */
@@ -118,13 +78,14 @@ static bool unpack(const vtp_file *v, const unsigned char *bytes, size_t size, s
 }
 
 /* Read `wanted` bytes of an array in binary or appended format. */
-static bool take_bytes(const vtp_file *v, const element *e, size_t wanted, unsigned char *out) {
+static bool take_bytes(const vtp_file *v, const mesh_element *e, size_t wanted,
+                       unsigned char *out) {
   const bool appended = is_attribute(e, "format", "appended");
   const char *at = e->body;
   if (appended) {
     char text[64];
     char *stop = NULL;
-    if (v->appended == NULL || !attribute(e, "offset", text, sizeof text)) {
+    if (v->appended == NULL || !supine_io_element_attribute(e, "offset", text, sizeof text)) {
       return false;
     }
     const unsigned long long offset = strtoull(text, &stop, 10);
@@ -149,10 +110,10 @@ static void free_numbers(double **numbers) {
 
 /* Read `count` numbers of an array; a string is read as the codes of its characters. The caller
  * frees the numbers, even after a failure. */
-static supine_status take_numbers(const vtp_file *v, const element *e, size_t count,
+static supine_status take_numbers(const vtp_file *v, const mesh_element *e, size_t count,
                                   double **numbers, supine_error *error) {
   char name[32] = "";
-  (void)attribute(e, "type", name, sizeof name);
+  (void)supine_io_element_attribute(e, "type", name, sizeof name);
   const mesh_text word = {(const unsigned char *)name, (const unsigned char *)strchr(name, '\0')};
   static const mesh_type character = {"String", 1, false, false};
   const mesh_type *type =
@@ -180,31 +141,35 @@ static supine_status take_numbers(const vtp_file *v, const element *e, size_t co
     for (size_t i = 0; i < count && good; ++i) {
       good = supine_io_text_number(&text, &values[i]);
     }
+    mesh_text more;
+    good = good && !supine_io_text_word(&text, &more);
   } else if (good) {
     for (size_t i = 0; i < count; ++i) {
       values[i] = supine_io_type_decode(type, bytes + i * type->size, false);
     }
   }
-  SUPINE_REFUSE_IF(!good, error, SUPINE_ERROR_FORMAT,
-                   "%s: an array is truncated or damaged; write the file again", v->file->path);
+  SUPINE_REFUSE_IF(
+      !good, error, SUPINE_ERROR_FORMAT,
+      "%s: an array is truncated or damaged, or longer than its counts; write the file again",
+      v->file->path);
   return SUPINE_OK;
 }
 
 /* Find an array in a piece's child element whose name is `within`. The array has the name `name`;
  * if this is NULL, take the first array. */
-static bool find_array(const vtp_file *v, const element *piece, const char *within,
-                       const char *name, element *found) {
-  element e;
-  element closing;
+static bool find_array(const vtp_file *v, const mesh_element *piece, const char *within,
+                       const char *name, mesh_element *found) {
+  mesh_element e;
+  mesh_element closing;
   char tag[32];
   (void)snprintf(tag, sizeof tag, "/%s", within);
   const char *limit = v->appended != NULL ? v->appended : v->end;
-  if (!find_element(piece->body, limit, within, &e) ||
-      !find_element(e.body, limit, tag, &closing)) {
+  if (!supine_io_element_find(piece->body, limit, within, &e) ||
+      !supine_io_element_find(e.body, limit, tag, &closing)) {
     return false;
   }
   const char *at = e.body;
-  while (find_element(at, closing.at, "DataArray", found)) {
+  while (supine_io_element_find(at, closing.at, "DataArray", found)) {
     if (name == NULL || is_attribute(found, "Name", name)) {
       return true;
     }
@@ -213,11 +178,11 @@ static bool find_array(const vtp_file *v, const element *piece, const char *with
   return false;
 }
 
-static bool count_of(const element *piece, const char *name, size_t *count) {
+static bool count_of(const mesh_element *piece, const char *name, size_t *count) {
   char text[32];
   char *end = NULL;
   *count = 0;
-  if (!attribute(piece, name, text, sizeof text)) {
+  if (!supine_io_element_attribute(piece, name, text, sizeof text)) {
     return true;
   }
   const unsigned long long value = strtoull(text, &end, 10);
@@ -225,10 +190,10 @@ static bool count_of(const element *piece, const char *name, size_t *count) {
   return end != text && *end == '\0' && text[0] != '-' && value <= MESH_VERTICES_MAX;
 }
 
-static supine_status take_polygons(const vtp_file *v, const element *piece, mesh_faces *faces,
+static supine_status take_polygons(const vtp_file *v, const mesh_element *piece, mesh_faces *faces,
                                    size_t count, supine_error *error) {
-  element offsets;
-  element connectivity;
+  mesh_element offsets;
+  mesh_element connectivity;
   if (count == 0) {
     return SUPINE_OK;
   }
@@ -256,32 +221,32 @@ static supine_status take_polygons(const vtp_file *v, const element *piece, mesh
   return SUPINE_OK;
 }
 
-static supine_status read_head(vtp_file *v, element *piece, supine_error *error) {
-  element root;
-  element appended;
-  element second;
+static supine_status read_head(vtp_file *v, mesh_element *piece, supine_error *error) {
+  mesh_element root;
+  mesh_element appended;
+  mesh_element second;
   char compressor[64];
-  const bool has_root = find_element(v->bytes, v->end, "VTKFile", &root);
+  const bool has_root = supine_io_element_find(v->bytes, v->end, "VTKFile", &root);
   SUPINE_REFUSE_IF(!has_root || !is_attribute(&root, "type", "PolyData"), error,
                    SUPINE_ERROR_FORMAT,
                    "%s: no VTKFile of type PolyData; save the surface as PolyData", v->file->path);
   SUPINE_REFUSE_IF(is_attribute(&root, "byte_order", "BigEndian"), error, SUPINE_ERROR_FORMAT,
                    "%s: big-endian VTP is not supported; save the surface as PLY", v->file->path);
   v->header_size = is_attribute(&root, "header_type", "UInt64") ? 8 : 4;
-  v->compressed = attribute(&root, "compressor", compressor, sizeof compressor);
+  v->compressed = supine_io_element_attribute(&root, "compressor", compressor, sizeof compressor);
   SUPINE_REFUSE_IF(v->compressed && strcmp(compressor, "vtkZLibDataCompressor") != 0, error,
                    SUPINE_ERROR_FORMAT, "%s: its compressor is not zlib; save the surface as PLY",
                    v->file->path);
-  if (find_element(root.body, v->end, "AppendedData", &appended)) {
+  if (supine_io_element_find(root.body, v->end, "AppendedData", &appended)) {
     const char *mark = memchr(appended.body, '_', (size_t)(v->end - appended.body));
     v->appended_raw = is_attribute(&appended, "encoding", "raw");
     v->appended = mark != NULL ? mark + 1 : NULL;
   }
   const char *limit = v->appended != NULL ? v->appended : v->end;
-  const bool has_piece = find_element(root.body, limit, "Piece", piece);
+  const bool has_piece = supine_io_element_find(root.body, limit, "Piece", piece);
   SUPINE_REFUSE_IF(!has_piece, error, SUPINE_ERROR_FORMAT,
                    "%s: no element Piece; write the file again", v->file->path);
-  const bool has_second = find_element(piece->body, limit, "Piece", &second);
+  const bool has_second = supine_io_element_find(piece->body, limit, "Piece", &second);
   SUPINE_REFUSE_IF(has_second, error, SUPINE_ERROR_FORMAT,
                    "%s: it has several Piece elements; save the surface as one piece",
                    v->file->path);
@@ -289,10 +254,10 @@ static supine_status read_head(vtp_file *v, element *piece, supine_error *error)
 }
 
 /* Read the axes from the string array SPACE that 3D Slicer and Supine write. */
-static void note_space(const vtp_file *v, const element *piece, mesh_file *file) {
+static void note_space(const vtp_file *v, const mesh_element *piece, mesh_file *file) {
   enum { SIZE = 4 }; /* three letters and a NUL */
-  element e;
-  for (const char *at = v->bytes; find_element(at, piece->at, "Array", &e); at = e.body) {
+  mesh_element e;
+  for (const char *at = v->bytes; supine_io_element_find(at, piece->at, "Array", &e); at = e.body) {
     if (!is_attribute(&e, "Name", "SPACE")) {
       continue;
     }
@@ -314,8 +279,8 @@ supine_status supine_io_read_vtp(mesh_file *file, supine_mesh *mesh, size_t *dro
   vtp_file v = {.file = file,
                 .bytes = (const char *)file->bytes,
                 .end = (const char *)file->bytes + file->size};
-  element piece;
-  element points;
+  mesh_element piece;
+  mesh_element points;
   size_t count[3];
   SUPINE_TRY(read_head(&v, &piece, error));
   note_space(&v, &piece, file);

@@ -225,6 +225,8 @@ TEST(test_image_unstated_spacing_and_spare_voxels_refused) {
       {"a.mha", MHA "Spacing = 1 1 2\nElementDataFile = LOCAL\nabcd", "name it ElementSpacing"},
       {"a.mha", MHA "elementspacing = 1 1 2\nElementDataFile = LOCAL\nabcd",
        "name it ElementSpacing"},
+      {"a.mha", MHA "ElementSpacing = 1 1 2\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\nabcd",
+       "one thing twice"},
       {"a.mha", MHA "ElementSpacing = 1 1 0\nElementDataFile = LOCAL\nabcd", "not above 0"},
       {"a.mha", MHA "ElementSpacing = 1 1 2\nDistanceUnits = ell\nElementDataFile = LOCAL\nabcd",
        "DistanceUnits"},

@@ -194,6 +194,21 @@ TEST(test_load_more_than_counted_refused) {
               "y\nproperty float z\nelement face 1\nproperty list uchar int "
               "vertex_indices\nend_header\n0 0 0\n120 0 0\n0 120 0\n3 0 1 2\n3 0 2 1\n",
               SUPINE_ERROR_FORMAT, "follow what the PLY header counts");
+#define OFF(count) "OFF # text\n3 " count " 0\n\n0 0 0\n120 0 0\n0 120 0\n3 0 1 2\n3 0 2 1 # back\n"
+  supine_mesh two = load(sample_text(state, "two.off", OFF("2"), path), NULL, NULL);
+  assert_int_equal(two.triangle_count, 2);
+  supine_mesh_free(&two);
+  refuse_text(state, "more.off", OFF("1"), SUPINE_ERROR_FORMAT, "it counts 4 lines of vertices");
+  refuse_text(state, "less.off", OFF("3"), SUPINE_ERROR_FORMAT, "but it holds 5");
+#define AC(count)                                                                                  \
+  "AC3Db\nMATERIAL \"m\" rgb 1 1 1 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT world\n"  \
+  "kids 1\nOBJECT poly\nnumvert 3\n0 0 0\n120 0 0\n0 120 0\nnumsurf " count                        \
+  "\nSURF 0x20\nmat 0\nrefs 3\n0 0 0\n1 0 0\n2 0 0\nSURF 0x20\nmat 0\nrefs 3\n0 0 0\n2 0 0\n"      \
+  "1 0 0\nkids 0\n"
+  two = load(sample_text(state, "two.ac", AC("2"), path), NULL, NULL);
+  assert_int_equal(two.triangle_count, 2);
+  supine_mesh_free(&two);
+  refuse_text(state, "more.ac", AC("1"), SUPINE_ERROR_FORMAT, "it counts 1 surfaces");
 }
 
 #define AMF(unit)                                                                                  \
@@ -212,7 +227,8 @@ TEST(test_load_amf_unit_of_the_file_used) {
                {AMF(" unit='inch'"), 25.4},
                {AMF(" unit=\"feet\""), 304.8},
                {AMF(" unit=\"meter\""), 1000.0},
-               {AMF(" unit=\"micron\""), 0.001}};
+               {AMF(" unit=\"micron\""), 0.001},
+               {"<!-- <amf unit=\"meter\"> -->" AMF("\n  unit = 'inch'"), 25.4}};
   char path[256];
   for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
     supine_mesh mesh = load(sample_text(state, "u.amf", files[i].text, path), NULL, NULL);
@@ -808,6 +824,7 @@ TEST(test_load_vtp_bad_files_refused) {
       {VTP_ASCII("0 0 0 1 0 0 0 1", "0 1 2", "3"), "truncated or damaged"},
       {VTP_ASCII(VTP_POINTS, "0 1 2", "-3"), "offsets of its polygons are invalid"},
       {VTP_ASCII(VTP_POINTS, "0 1", "3"), "truncated or damaged"},
+      {VTP_ASCII(VTP_POINTS, "0 1 2 0 2 1", "3 6"), "longer than its counts"},
       {VTP_BINARY("", "CAAAAAAAAAEAAAABAA==", "base64", "AwAAAAABAg==AQAAAAM="), "damaged"},
       {VTP_BINARY("header_type=\"UInt64\"", "CQAAAAAAAAEAAAABAA==", "base64", ""), "damaged"},
       {VTP_BINARY("", "CQAAAAAAAAEAAAABAA==", "base64", "AwAAAAABAg=="), "damaged"},
