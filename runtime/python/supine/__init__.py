@@ -19,6 +19,7 @@ import ctypes
 import functools
 import gzip
 import io
+import operator
 import os
 import tempfile
 from typing import Any, Mapping, NamedTuple, Optional, Sequence, Union
@@ -538,6 +539,7 @@ class Basis:
         density: whether to scale densities by the change of volume, so that mass is kept
         since: state of the image, if it is not that of the scan
         """
+        image = np.asarray(image)
         image = np.ascontiguousarray(image, image.dtype.newbyteorder("<"))
         header = _augment.nrrd(image, step, origin)
         wanted = [states] if isinstance(states, str) else list(states)
@@ -654,7 +656,7 @@ class Location:
             raise ValueError(f"the number of sources, {len(start)}, is not the number of positions, {count}")
         if len(vertices) != count:
             raise ValueError(f"the number of vertices, {len(vertices)}, is not the number of positions, {count}")
-        seen = (_c.Observation * max(count, 1))(*((int(v), tuple(p), noise, not np.isnan(s).all(), tuple(s))
+        seen = (_c.Observation * max(count, 1))(*((operator.index(v), tuple(p), noise, not np.isnan(s).all(), tuple(s))
                                                   for v, p, s in zip(vertices, places, start, strict=True)))
         residuals = (_c.Residual * max(count, 1))()
         self._space = np.empty(_c.locate_space(count))  # memory that the C library uses in later calls

@@ -66,6 +66,9 @@ def nrrd(image: NDArray[Any], step: ArrayLike, origin: ArrayLike) -> bytes:
     if image.ndim != 3 or image.dtype.name not in VOXELS:
         raise ValueError(f"image must be an array [z, y, x] of {', '.join(VOXELS)}")
     steps = np.asarray(step, np.float64)
+    if steps.shape not in ((3,), (3, 3)) or np.shape(origin) != (3,):
+        raise ValueError(f"step must be [3] or [3, 3], and origin [3], not {list(steps.shape)} and "
+                         f"{list(np.shape(origin))}")
     numbers = [f"({','.join(repr(float(x)) for x in row)})"
                for row in [*(np.diag(steps) if steps.ndim == 1 else steps), np.asarray(origin)]]
     return (f"NRRD0004\ntype: {VOXELS[image.dtype.name]}\ndimension: 3\nspace: left-posterior-superior\n"
@@ -102,10 +105,10 @@ class _Pipe:
         return data
 
     def heard(self) -> str:
-        """Return what the program has said, of `image` and `labels` instead of their files. It goes on writing to the
-        same file, whose position must stay."""
+        """Return what the program has said, of `image`, `labels` and `states` instead of their files. It goes on
+        writing to the same file, whose position must stay."""
         said = os.pread(self.said.fileno(), 1 << 20, 0).decode(errors="replace")
-        return re.sub(re.escape(self.folder) + r"/(\w+)\.nrrd", r"\1", said)
+        return re.sub(re.escape(self.folder) + r"/(\w+)\.(nrrd|csv)", r"\1", said)
 
     def image(self) -> NDArray[Any]:
         """Read a NIfTI image [z, y, x], or [3, z, y, x] for a field."""
@@ -116,7 +119,7 @@ class _Pipe:
 
 
 def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optional[NDArray[Any]] = None,
-            points: Any = None, states: Union[int, Sequence[str]] = 100, step: ArrayLike = (1.0, 1.0, 1.0),
+            points: Any = None, states: Union[int, str, Sequence[str]] = 100, step: ArrayLike = (1.0, 1.0, 1.0),
             origin: ArrayLike = (0.0, 0.0, 0.0),
             grid: float = 4.0, density: bool = True, rigid: Sequence[int] = (), seed: Any = None) -> Iterator[Sample]:
     """Move a CT, a label map and points of the scan into each of many states. The program `supine` reads them once and
@@ -129,7 +132,8 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
     lungs: basis of the scan
     image, labels: arrays [z, y, x] on the same voxels; densities need Hounsfield units
     points: named points, an array [n, 3] in mm and LPS, or files, as for `embed`
-    states: texts such as "prone:rest+300", or the number of states that random_states draws with `seed`
+    states: a text such as "prone:rest+300", a list of texts, or the number of states that random_states draws with
+        `seed`
     step, origin: distances (x, y, z) between voxels, or a vector for each axis [3, 3], and the first voxel; mm, LPS
     grid: distance between the nodes of the displacement field, mm
     density: whether to scale the density of aerated tissue by the change of volume, so that mass is kept; nodules and
@@ -139,9 +143,11 @@ def augment(lungs: Any, image: Optional[NDArray[Any]] = None, *, labels: Optiona
         raise ValueError("rigid names values of labels: give labels")
     from . import embed  # the package imports this module
 
+    image, labels = (None if array is None else np.asarray(array) for array in (image, labels))
     if image is not None and labels is not None and image.shape != labels.shape:
         raise _c.ArgumentError(f"the shapes of image and labels differ, {image.shape} and {labels.shape}: give both "
                                f"on the same voxels")
+    states = [states] if isinstance(states, str) else states
     wanted = random_states(lungs, states, seed) if isinstance(states, int) else list(states)
     inside = None if points is None else embed(lungs, points)
     # a basis groups points by lung

@@ -93,7 +93,7 @@ def _write_points(path: str, points: Union[ArrayLike, Mapping[str, Sequence[floa
                              "name of its own")
     names = [[name] for name in points] if isinstance(points, Mapping) else None
     places = np.asarray(list(points.values()) if isinstance(points, Mapping) else points, np.float64)
-    if places.size == 0 or places.ndim > 2 or places.shape[-1] != 3:
+    if places.ndim not in (1, 2) or places.size == 0 or places.shape[-1] != 3:
         raise ValueError(f"points must be [n, 3], not {list(places.shape)}")
     rows = places.reshape(-1, 3).tolist()
     with open(path, "wb") as file:
