@@ -317,6 +317,44 @@ static void find_turn(workspace *s) {
   s->found->turn = n > 3 && turned < straight / 16 ? angle_of(motion.rotation, vector) : 0;
 }
 
+/* Measure how much wider, deeper and higher the points lie than the law predicts: on each axis the
+ * slope b of the observed over the predicted positions x about their means, and its standard error
+ *
+ *     b = 1 + sum x r / sum x^2,   sqrt(sum (r - (b - 1) x)^2 / (n - 2) / sum x^2)
+ *
+ * where r is the residual. Outliers and points on lines do not count. */
+static void find_stretch(workspace *s, const supine_locate_residual *residuals) {
+  enum { POINTS_LEAST = 10 };
+  double used[SUPINE_LOCATE_POINTS_MAX];
+  double n = 0;
+  for (size_t j = 0; j < s->task->count; ++j) {
+    used[j] = residuals[j].outlier || s->points[j].on_line ? 0 : 1;
+    n += used[j];
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    double x = 0; /* sums */
+    double r = 0;
+    double xx = 0;
+    double xr = 0;
+    double rr = 0;
+    for (size_t j = 0; j < s->task->count; ++j) {
+      const double predicted = s->law[3 * j + k] - s->law[k];
+      const double residual = s->points[j].residual[k];
+      x += used[j] * predicted;
+      r += used[j] * residual;
+      xx += used[j] * predicted * predicted;
+      xr += used[j] * predicted * residual;
+      rr += used[j] * residual * residual;
+    }
+    const double size = xx - x * x / n;
+    const double slope = (xr - x * r / n) / size;
+    const double left = fmax(0, rr - r * r / n - slope * slope * size);
+    const bool enough = n >= POINTS_LEAST && size > 0;
+    s->found->stretch[k] = enough ? 1 + slope : 1;
+    s->found->stretch_error[k] = enough ? sqrt(left / (n - 2) / size) : 0;
+  }
+}
+
 static bool sighted(const workspace *s) {
   for (size_t j = 0; j < s->task->count; ++j) {
     if (s->points[j].on_line) {
@@ -564,6 +602,27 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
   return status;
 }
 
+/* Warn of the axis on which the points are farthest from the predicted size, if they are too far.
+ */
+static void check_stretch(const supine_location_info *found, supine_findings *findings) {
+  static const char *const sizes[] = {"width", "depth", "height"};
+  size_t worst = 0;
+  double most = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const double stretch = found->stretch[k];
+    const double off = stretch > 0 ? fabs(log(stretch)) - 2 * found->stretch_error[k] : INFINITY;
+    worst = off > most ? k : worst;
+    most = fmax(most, off);
+  }
+  if (supine_input_judge(SUPINE_INPUT_LOCATE_STRETCHED, most) != SUPINE_INPUT_TAKEN) {
+    supine_findings_warn(findings,
+                         "the %s of what the points show is %.2f times that of these lungs in the "
+                         "fitted state: check that the points are this person's, their unit and "
+                         "axes, the volume and the posture",
+                         sizes[worst], found->stretch[worst]);
+  }
+}
+
 void supine_location_check(const supine_location_info *found, supine_findings *findings) {
   const double expected = found->residual_expected;
   const double ratio = expected > 0 ? found->residual_rms / expected : 0;
@@ -579,6 +638,8 @@ void supine_location_check(const supine_location_info *found, supine_findings *f
                          "where %.1f mm are expected: check the volume, the posture, and the names "
                          "of the points",
                          found->residual_rms, expected);
+  } else {
+    check_stretch(found, findings);
   }
 }
 
@@ -614,6 +675,7 @@ supine_status supine_locate(const supine_locate_task *task, supine_locate_residu
     found->volume_prior_error = s.fit->deviation;
     found->state.volume = (supine_volume){SUPINE_VOLUME_ABSOLUTE, found->volume};
   }
+  find_stretch(&s, residuals);
   rotate(found->rotation, s.fit->kriging.terms, found->translation);
   for (size_t i = 0; i < 3; ++i) {
     found->translation[i] += s.fit->origin[i];

@@ -354,8 +354,6 @@ ROWS = {("scan", "person"): "one-person", ("scan", "swapped"): "rest-most",
 KNOWN = {
     ("command deform --labels", "mirror"): "belongs",
     ("command validate --state", "swapped"): "belongs",
-    ("command locate OBSERVED", "person"): "belongs",
-    ("Python locate()", "person"): "belongs",
     ("command embed MESH", "range"): "one road",
     ("command compare --breath", "range"): "one road",
 }

@@ -75,14 +75,15 @@ def embedded(z):
             "Python": lambda: run(lambda: python(lambda: supine.embed(lungs, "points.csv")))}
 
 
-def located(volume, degrees=0.0):
-    """Locate the lungs from points where they are in supine posture at rest, in a frame that is turned."""
+def located(volume, degrees=0.0, scale=(1, 1, 1)):
+    """Locate the lungs from points where they are in supine posture at rest, in a frame that is turned; or of lungs of
+    another size."""
     names = list(inside.points)
     vertices = [inside.points[name] for name in names]
     seen = inside.deform(inside.pose("supine:rest"))[vertices].astype(float)
     t, mean = np.radians(degrees), seen.mean(axis=0)
     turn = np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]])
-    seen = (seen - mean) @ turn.T + mean
+    seen = (seen - mean) @ turn.T * scale + mean
 
     def by_command():
         with open("seen.csv", "w", encoding="utf-8") as file:
@@ -282,6 +283,7 @@ CASES = {
     "lungs-small": (made("small.ply", units="mm"), made("small.ply", units="mm", height=170), "told"),
     "locate-residuals": (lambda: located("rest"), lambda: located("full"), None),
     "locate-turned": (lambda: located("rest"), lambda: located("rest", 25.0), None),
+    "locate-stretched": (lambda: located("rest"), lambda: located("rest", scale=(1.25, 1, 0.9)), "told"),
     "label-value": (lambda: mapped(sides.astype(np.float32) + np.float32(1e-4)),
                     lambda: mapped(sides.astype(np.float32) * 1.5), "refused"),
     "labels-ratio": (lambda: mapped(sides), lambda: mapped(tumour(8)), "refused"),

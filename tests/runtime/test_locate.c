@@ -489,4 +489,31 @@ TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
   }
 }
 
+/* A slope of 1.25 along x, in a turned frame, too. */
+TEST(test_locate_points_of_wider_lungs_stretch_found_and_told) {
+  world *w = *state;
+  const supine_state truth = state_of("supine:full-700");
+  for (int turned = 0; turned < 2; ++turned) {
+    float xyz[3 * VERTICES];
+    supine_findings findings = {.count = 0};
+    observe(w, &truth, false);
+    deform(w->basis, &truth, xyz);
+    const supine_location_info *about = supine_location_get_info(locate(w, &truth, false));
+    assert_true(fabs(about->stretch[0] - 1) < 1e-5 && about->stretch_error[0] < 1e-5);
+    for (size_t j = 0; j < SEEN; ++j) {
+      const size_t at = w->seen[j].vertex;
+      const double x[3] = {1.25 * (double)xyz[3 * at], (double)xyz[3 * at + 1],
+                           (double)xyz[3 * at + 2]};
+      move(turned == 1, x, w->seen[j].position);
+    }
+    about = supine_location_get_info(locate(w, &truth, turned == 1));
+    const double most = turned == 1 ? 0.1 : 1e-5; /* the rotation that fits best is another */
+    assert_true(fabs(about->stretch[0] - 1.25) < most);
+    assert_true(fabs(about->stretch[1] - 1) < most && fabs(about->stretch[2] - 1) < most);
+    supine_location_check(about, &findings);
+    assert_int_equal(findings.count, 1);
+    assert_says(findings.list[0].text, "the width of what the points show is 1.2");
+  }
+}
+
 TEST_GROUP(setup, teardown)

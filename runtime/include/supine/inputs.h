@@ -75,6 +75,7 @@ typedef enum supine_input_id {
   /* Lungs located from observed points. */
   SUPINE_INPUT_LOCATE_RESIDUALS,
   SUPINE_INPUT_LOCATE_TURNED,
+  SUPINE_INPUT_LOCATE_STRETCHED,
   /* Words. */
   SUPINE_INPUT_SUGGESTION,
   /* Displacement fields of another simulator. */

@@ -179,6 +179,10 @@ typedef struct supine_location_info {
                          rotation was to be found; 0 if there is none */
   double depth_error; /**< standard deviation of the translation along one view, mm; 0 if several
                          views or points fix it */
+  double stretch[3];  /**< width, depth and height of what the points show, in the frame of the
+                         basis, as multiples of the predicted ones; 1 if fewer than ten points are
+                         known in space */
+  double stretch_error[3]; /**< standard errors of `stretch` */
 } supine_location_info;
 
 /** Comparison of an observed point with its prediction by all other points. */
@@ -233,7 +237,8 @@ SUPINE_API supine_status supine_locate(const supine_locate_task *task,
 SUPINE_API const supine_location_info *supine_location_get_info(const supine_location *found);
 
 /** Warn of what is doubtful in what supine_locate found: residuals that are much larger than
- * expected, or a frame that is turned (checks locate-residuals and locate-turned). */
+ * expected, a frame that is turned, or points that are of wider, deeper or higher lungs (checks
+ * locate-residuals, locate-turned and locate-stretched). */
 SUPINE_API void supine_location_check(const supine_location_info *found, supine_findings *findings);
 
 /** Compute the positions of all vertices in the frame of the observations, and their expected

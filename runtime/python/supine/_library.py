@@ -179,7 +179,8 @@ class LocationInfo(ctypes.Structure):
     _fields_ = [("state", State), ("volume", c_double), ("volume_error", c_double), ("volume_prior_error", c_double),
                 ("rotation", c_double * 9), ("translation", c_double * 3), ("residual_rms", c_double),
                 ("log_evidence", c_double), ("outlier_count", c_size_t), ("residual_expected", c_double),
-                ("turn", c_double), ("depth_error", c_double)]
+                ("turn", c_double), ("depth_error", c_double), ("stretch", c_double * 3),
+                ("stretch_error", c_double * 3)]
 
 
 class DoubtTask(ctypes.Structure):
