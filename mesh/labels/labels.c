@@ -25,6 +25,7 @@ typedef struct work {
   supine_labels_report *report;
   double edge;
   supine_image image; /* the label map; freed when the lungs have been copied to `both` */
+  int bordered; /* number of axes, from the first, along which the image ends where the scan does */
   labels_mask both;
   labels_choice choice;
 } work;
@@ -95,7 +96,7 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
  * off a part of the lung. */
 static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
   bool cut = false;
-  for (int a = 0; a < 3; ++a) {
+  for (int a = 0; a < w->bordered; ++a) {
     const size_t size = w->report->size[a];
     const long first = w->both.from[a] + lung->from[a] + (long)margin;
     const long last = first + (long)(lung->size[a] - 2 * margin) - 1;
@@ -131,6 +132,7 @@ static supine_status read_map(work *w, const char *const *paths, size_t count,
   }
   describe_axes((const double(*)[3])w->image.step, report->axes, sizeof report->axes);
   report->source = w->image.frame_source;
+  w->bordered = w->image.is_segmentation ? 2 : 3; /* its slices may be those with lung only */
   report->frames_differ = w->image.frames_differ;
   report->coordinates = w->image.axes;
   SUPINE_ARENA arena = {0};

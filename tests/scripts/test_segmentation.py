@@ -7,17 +7,16 @@ equal those of the same labels in NIfTI, whose volumes nibabel gives. Other obje
 Exit with 77 if pydicom, nibabel or dcm2json is missing."""
 import os
 import pathlib
-import random
 import shutil
 import subprocess
 import sys
 import tempfile
 
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 try:
     import nibabel
     import numpy as np
-    from pydicom.dataset import Dataset, FileMetaDataset
-    from pydicom.uid import ExplicitVRLittleEndian, generate_uid
+    from helpers.segmentation import CT, RTSTRUCT, write
 except ImportError as error:
     print(f"skipped: {error}")
     sys.exit(77)
@@ -26,7 +25,6 @@ if shutil.which("dcm2json") is None:
     sys.exit(77)
 
 supine, lungs, guide = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-SEG, RTSTRUCT, CT = "1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.481.3", "1.2.840.10008.5.1.4.1.1.2"
 # Segments: the file of a lobe, its code in SNOMED CT with the side in a modifier, as TotalSegmentator and 3D Slicer
 # write it (DICOM CID 7155), and the code that has the side in it.
 LEFT, RIGHT = "7771000", "24028007"
@@ -36,59 +34,6 @@ LOBES = {"lung_upper_lobe_left": ("45653009", LEFT, "44714003"),
          "lung_middle_lobe_right": ("40020002", "", "72481006"),
          "lung_lower_lobe_right": ("90572001", RIGHT, "266005")}
 NUMBERS = {name: number for number, name in enumerate(LOBES, 3)}
-
-
-def items(**members):
-    made = Dataset()
-    for name, value in members.items():
-        setattr(made, name, value)
-    return [made]
-
-
-def write(path, masks, codes, affine, fractional=False, kind=SEG, syntax=ExplicitVRLittleEndian, shift=0.0):
-    """Write {number: mask [i, j, k]} as a segmentation, its frames in any order and without those that are empty. Codes
-    are {number: (code, code of its modifier)}."""
-    lps = np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
-    spacing = np.linalg.norm(lps[:3, :3], axis=0)
-    one = Dataset()
-    one.file_meta = FileMetaDataset()
-    one.file_meta.MediaStorageSOPClassUID, one.file_meta.TransferSyntaxUID = kind, syntax
-    one.file_meta.MediaStorageSOPInstanceUID = one.SOPInstanceUID = generate_uid()
-    one.is_little_endian, one.is_implicit_VR = True, False
-    one.SOPClassUID, one.Modality, one.PatientID = kind, "SEG", "synthetic"
-    one.SegmentationType = "FRACTIONAL" if fractional else "BINARY"
-    one.Rows, one.Columns = next(iter(masks.values())).shape[1::-1]
-    one.SegmentSequence = []
-    for number in masks:
-        code, modifier = codes.get(number, ("10200004", ""))
-        kind_of_part = items(CodeValue=code, CodingSchemeDesignator="SCT", CodeMeaning="a part")
-        if modifier:
-            kind_of_part[0].SegmentedPropertyTypeModifierCodeSequence = items(
-                CodeValue=modifier, CodingSchemeDesignator="SCT", CodeMeaning="a side")
-        one.SegmentSequence += items(SegmentNumber=number, SegmentLabel=f"segment {number}",
-                                     SegmentedPropertyTypeCodeSequence=kind_of_part)
-    one.SharedFunctionalGroupsSequence = items(
-        PixelMeasuresSequence=items(PixelSpacing=[spacing[1], spacing[0]], SliceThickness=spacing[2],
-                                    SpacingBetweenSlices=spacing[2]),
-        PlaneOrientationSequence=items(ImageOrientationPatient=[*lps[:3, 0] / spacing[0], *lps[:3, 1] / spacing[1]]))
-    frames = [(number, k) for number, mask in masks.items() for k in range(mask.shape[2]) if mask[:, :, k].any()]
-    random.Random(3).shuffle(frames)
-    one.NumberOfFrames, one.PerFrameFunctionalGroupsSequence, planes = len(frames), [], []
-    for index, (number, k) in enumerate(frames):
-        at = lps[:3, 3] + k * lps[:3, 2] + (shift if index == 5 else 0.0)
-        one.PerFrameFunctionalGroupsSequence += items(
-            PlanePositionSequence=items(ImagePositionPatient=[f"{x:.6f}" for x in at]),
-            SegmentIdentificationSequence=items(ReferencedSegmentNumber=number))
-        planes.append(masks[number][:, :, k].T.ravel())
-    if fractional:
-        one.MaximumFractionalValue, one.BitsAllocated = 200, 8
-        content = (np.concatenate(planes) * 120 + 40).astype(np.uint8).tobytes()
-    else:
-        one.BitsAllocated = 1
-        content = np.packbits(np.concatenate(planes), bitorder="little").tobytes()
-    one.SamplesPerPixel, one.BitsStored = 1, one.BitsAllocated
-    one.add_new((0x7FE0, 0x0010), "OB", content + bytes(len(content) % 2))
-    one.save_as(path, write_like_original=False)
 
 
 def run(*arguments):
@@ -139,6 +84,7 @@ with tempfile.TemporaryDirectory() as folder:
                             ("uncoded.dcm", ("--labels", "left=3+4,right=5+6+7"))):
         found, corners, said = surfaces(source, *options)
         assert corners == triangles and np.abs(found - expected).max() < 1e-3, source  # NIfTI's header has float32
+        assert "border" not in said, said  # the first and the last slice of `masks` are full of lung
         for side, value in volume.items():
             assert f"{side} lung: {value:.1f} mL" in said, (side, value, said)
 
