@@ -23,6 +23,7 @@ import csv
 import os
 import sys
 import tempfile
+import zlib
 from itertools import product
 from pathlib import Path
 
@@ -42,9 +43,10 @@ def read(path):
     """Return the numbers of an image [x, y, z] and its affine map from voxels to mm."""
     try:
         image = nibabel.load(path)
-    except (OSError, nibabel.filebasedimages.ImageFileError) as error:
-        sys.exit(f"{path}: {error}")
-    return np.asarray(image.dataobj, np.float32).reshape(image.shape[:3] + image.shape[4:]), image.affine
+        values = np.asarray(image.dataobj, np.float32)
+    except (OSError, EOFError, ValueError, zlib.error, nibabel.filebasedimages.ImageFileError) as error:
+        sys.exit(f"{path}: {error}: give a whole image")
+    return values.reshape(image.shape[:3] + image.shape[4:]), image.affine
 
 
 def sample(values, affine, points):
