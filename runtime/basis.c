@@ -12,6 +12,7 @@
 #include "base/number.h"
 #include "runtime/checks.h"
 #include "runtime/clusters.h"
+#include "runtime/kriging.h"
 #include "runtime/safetensors/safetensors_file.h"
 #include "runtime/simulated.h"
 
@@ -535,11 +536,30 @@ static supine_status check_normals(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Check the optional tensor 'error_share' of a fit of landmarks. */
-static supine_status check_error_share(const check *c, supine_basis *basis) {
+/* Check the optional tensors of a fit of landmarks: 'landmarks' and 'error_share'. */
+static supine_status check_landmarks(const check *c, supine_basis *basis) {
   size_t n = basis->info.vertex_count;
+  size_t landmarks[2] = {ANY, 4};
   if (supine_safetensors_find(c->file, "error_share") == NULL) {
     return SUPINE_OK;
+  }
+  if (supine_safetensors_find(c->file, "landmarks") != NULL) {
+    REQUIRE(basis->landmarks, c, "landmarks", SUPINE_F32, 2, landmarks);
+    const char *text = supine_safetensors_metadata(c->file, "expected_error_share");
+    basis->landmark_count = landmarks[0];
+    basis->held_out = text == NULL ? 0 : supine_number_parse(text, NULL);
+    if (basis->landmark_count > SUPINE_KRIGING_LANDMARKS_MAX || !(basis->held_out > 0)) {
+      return refuse(c,
+                    "it has %zu landmarks, more than %d, or no share at points that were held "
+                    "out",
+                    basis->landmark_count, (int)SUPINE_KRIGING_LANDMARKS_MAX);
+    }
+    for (size_t i = 0; i < 4 * basis->landmark_count; ++i) {
+      if (!(fabsf(basis->landmarks[i]) < 1e6F)) {
+        return refuse(c, "tensor 'landmarks' has %g in row %zu", (double)basis->landmarks[i],
+                      i / 4);
+      }
+    }
   }
   REQUIRE(basis->error_share, c, "error_share", SUPINE_F32, 1, &n);
   for (size_t i = 0; i < n; ++i) {
@@ -764,7 +784,8 @@ static supine_status open_file(const char *name, const void *bytes, size_t size,
       check_numbers, check_surface,   check_field,     check_modes,         check_lungs,
       check_weights, check_volume,    check_reference, check_rest,          check_range,
       check_scan,    check_simulated, check_normals,   check_rigid,         check_expected,
-      check_errors,  check_collapse,  check_names,     check_vertex_errors, check_error_share, identify};
+      check_errors,  check_collapse,  check_names,     check_vertex_errors, check_landmarks,
+      identify};
   for (size_t i = 0; i < sizeof steps / sizeof *steps; ++i) {
     SUPINE_TRY(steps[i](&c, basis));
   }

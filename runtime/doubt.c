@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/arena.h"
 #include "base/vec3.h"
 #include "runtime/doubt.h"
 #include "runtime/internal.h"
@@ -12,9 +13,17 @@ enum { STATES = SUPINE_DOUBT_STATES_MAX, SWEEPS = 40 };
 /* Ratio of the deviation of each axis to the expected error: 4/9 of its square. */
 static const double axis_share = 2.0 / 3.0;
 
-size_t supine_doubt_space(size_t state_count) {
-  const size_t bytes = sizeof(supine_doubt) + state_count * sizeof(supine_expected_model);
+/* Doubles that a struct of `bytes` takes. */
+static size_t doubles_of(size_t bytes) {
   return (bytes + sizeof(double) - 1) / sizeof(double);
+}
+
+size_t supine_doubt_space(const supine_basis *basis, size_t state_count) {
+  const size_t n = basis->landmark_count;
+  const size_t seen = doubles_of(sizeof(supine_kriging)) +
+                      doubles_of(n * sizeof(supine_kriging_point)) + supine_kriging_space(n);
+  return doubles_of(sizeof(supine_doubt) + state_count * sizeof(supine_expected_model)) +
+         (n > 0 ? seen : 0);
 }
 
 /* Return the sum of the mean squares of the terms displacement and turn from one state to another,
@@ -105,6 +114,35 @@ static supine_status correlate(const supine_doubt_task *task, const supine_state
   return status;
 }
 
+/* Prepare the errors of each state. */
+static supine_status prepare_states(const supine_doubt_task *task, const supine_state *from,
+                                    supine_doubt *d, supine_error *error) {
+  for (size_t s = 0; s < task->state_count; ++s) {
+    supine_pose pose;
+    double unit[2][3] = {{0}};
+    SUPINE_TRY(supine_basis_pose(task->basis, &task->states[s], &pose, error)); /* judges volumes */
+    SUPINE_TRY(
+        supine_expected_prepare(task->basis, &task->states[s], from, 0, 0, &d->model[s], error));
+    (void)supine_normalise(task->states[s].gravity, unit[0]); /* both were accepted */
+    (void)supine_normalise(from->gravity, unit[1]);
+    supine_subtract(unit[0], unit[1], d->turn[s]);
+  }
+  return correlate(task, from, d, error);
+}
+
+/* Prepare the errors of located lungs. */
+static supine_status prepare_location(const supine_location *found, const supine_state *scan,
+                                      supine_doubt *d, supine_error *error) {
+  double unit[2][3] = {{0}};
+  (void)supine_normalise(found->info.state.gravity, unit[0]);
+  (void)supine_normalise(scan->gravity, unit[1]);
+  supine_subtract(unit[0], unit[1], d->turn[0]);
+  d->root[0][0] = 1;
+  d->seen = &found->kriging;
+  return supine_expected_prepare(d->basis, &found->info.state, scan, found->deviation,
+                                 found->options.model.least, d->model, error);
+}
+
 supine_status supine_doubt_prepare(const supine_doubt_task *task, double *space,
                                    const supine_doubt **doubt, supine_error *error) {
   const supine_state scan = supine_basis_scan(task->basis);
@@ -115,68 +153,117 @@ supine_status supine_doubt_prepare(const supine_doubt_task *task, double *space,
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "%zu states: give 1 to %d",
                             task->state_count, (int)STATES);
   }
-  *d = (supine_doubt){
-      .basis = task->basis, .state_count = task->state_count, .another_day = task->another_day};
-  supine_status status = SUPINE_OK;
-  for (size_t s = 0; s < task->state_count && status == SUPINE_OK; ++s) {
-    supine_pose pose;
-    double unit[2][3] = {{0}};
-    status = supine_basis_pose(task->basis, &task->states[s], &pose, error); /* refuses volumes */
-    if (status == SUPINE_OK) {
-      status =
-          supine_expected_prepare(task->basis, &task->states[s], from, 0, 0, &d->model[s], error);
+  if (task->location != NULL &&
+      (task->state_count > 1 || task->from != NULL || task->another_day)) {
+    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                            "located lungs have one state, which counts from the scan, on the day "
+                            "of the observations");
+  }
+  *d = (supine_doubt){.basis = task->basis,
+                      .state_count = task->state_count,
+                      .another_day = task->another_day,
+                      .location = task->location};
+  if (task->location != NULL) {
+    SUPINE_TRY(prepare_location(task->location, &scan, d, error));
+  } else {
+    SUPINE_TRY(prepare_states(task, from, d, error));
+    const size_t n = task->basis->landmark_count;
+    if (n > 0) {
+      space += doubles_of(sizeof *d + task->state_count * sizeof *d->model);
+      supine_kriging *seen = (supine_kriging *)space;
+      space += doubles_of(sizeof *seen);
+      supine_kriging_point *points = (supine_kriging_point *)space;
+      space += doubles_of(n * sizeof *points);
+      SUPINE_TRY(supine_expected_fit_landmarks(task->basis, points, space, seen, error));
+      d->seen = seen;
     }
-    if (status == SUPINE_OK) { /* both gravities were accepted */
-      (void)supine_normalise(task->states[s].gravity, unit[0]);
-      (void)supine_normalise(from->gravity, unit[1]);
-      supine_subtract(unit[0], unit[1], d->turn[s]);
+  }
+  *doubt = d;
+  return SUPINE_OK;
+}
+
+/* Divide the error of a vertex into the part of which landmarks show some, and the rest. */
+static void share_landmarks(const supine_doubt *d, size_t vertex, const float *reference,
+                            const double square[SUPINE_EXPECTED_TERMS], supine_doubt_features *f) {
+  const double place[3] = {(double)reference[0], (double)reference[1], (double)reference[2]};
+  const double share = d->basis->held_out * (double)d->basis->error_share[vertex];
+  f->seen = supine_kriging_landmark(place, f->lung);
+  f->deviation = axis_share * sqrt(square[SUPINE_EXPECTED_TURN]);
+  f->seen_factor = share > 0 ? axis_share * sqrt(square[SUPINE_EXPECTED_DISPLACEMENT] / share) : 0;
+}
+
+/* Fill in what a vertex of located lungs has otherwise. Errors are multiplied as locate states. */
+static void follow_location(const supine_location *found, const supine_location_block *block,
+                            size_t i, supine_doubt_features *f) {
+  const double variance = (double)block->variance[i];
+  const double bounded = supine_location_square(found, block, i);
+  f->deviation = 0;
+  f->seen_factor = variance > 0 ? found->factor * sqrt(bounded / variance) : 0;
+  f->seen = (supine_kriging_point){.lung = f->lung, .size = (double)block->size[i]};
+  memset(f->vector[0], 0, sizeof f->vector[0]);
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t at = 3 * i + k;
+    f->seen.position[k] = (double)block->scan[at];
+    f->seen.volume[k] = found->options.volume ? (double)block->volume[at] : 0;
+    f->at[k] += (double)block->shift[at];
+    for (size_t v = 1; v < DOUBT_VECTORS; ++v) {
+      f->vector[v][k] *= found->factor;
     }
   }
-  if (status == SUPINE_OK) {
-    status = correlate(task, from, d, error);
+}
+
+/* Compute the features of vertex `begin` + i from the evaluated formula of the expected error. */
+static void find_features(const supine_doubt *d, size_t begin, size_t i, const float *reference,
+                          const supine_expected_block *block, supine_doubt_features *f) {
+  const supine_expected_model *m = &d->model[f->state];
+  const double *square = block->square[i];
+  f->deviation =
+      axis_share * sqrt(square[SUPINE_EXPECTED_DISPLACEMENT] + square[SUPINE_EXPECTED_TURN]);
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t at = 3 * i + k;
+    const double moved[2] = {(double)block->x[EXPECTED_AT][at],
+                             (double)block->x[EXPECTED_FROM][at]};
+    f->at[k] = (double)reference[k] + moved[0];
+    f->place[k] = (double)reference[k] + moved[1];
+    if (m->per_step > 0) {
+      f->vector[0][k] = m->per_step * ((double)block->x[EXPECTED_FULLER][at] - moved[0] -
+                                       (double)block->x[EXPECTED_FULLER_FROM][at] + moved[1]);
+    }
+    if (k < 2 && m->across > 0) { /* the root of the term is its length across the body */
+      f->vector[1][k] = sqrt(square[SUPINE_EXPECTED_HEART]) * d->turn[f->state][k] / m->across;
+    }
   }
-  if (status == SUPINE_OK) {
-    *doubt = d;
+  f->vector[2][0] = EXPECTED_SLIDING * d->turn[f->state][0];
+  memcpy(f->vector[3], block->collapse[i], sizeof f->vector[3]);
+  if (d->seen != NULL && d->location == NULL) {
+    share_landmarks(d, begin + i, reference, square, f);
   }
-  return status;
 }
 
 void supine_doubt_evaluate(const supine_doubt *d, size_t state, size_t begin, size_t end,
                            supine_doubt_features *features) {
-  const supine_expected_model *m = &d->model[state];
-  const float *vertices = supine_basis_vertices(d->basis);
+  const float *vertices = supine_basis_vertices(d->basis) + 3 * begin;
   const supine_basis_info *info = supine_basis_get_info(d->basis);
-  supine_expected_block block;
+  supine_location_block block;
   size_t lung = 0;
-  supine_expected_evaluate(m, begin, end, &block);
+  while (begin >= info->lung_begin[lung + 1]) {
+    ++lung;
+  }
+  if (d->location != NULL) {
+    supine_location_evaluate(d->location, d->model, lung, begin, end, &block);
+  } else {
+    supine_expected_evaluate(&d->model[state], begin, end, &block.formula);
+  }
   for (size_t i = 0; i < end - begin; ++i) {
     supine_doubt_features *f = &features[i];
-    const double *square = block.square[i];
     while (begin + i >= info->lung_begin[lung + 1]) {
       ++lung;
     }
-    memset(f, 0, sizeof *f);
-    f->state = state;
-    f->lung = lung;
-    f->deviation =
-        axis_share * sqrt(square[SUPINE_EXPECTED_DISPLACEMENT] + square[SUPINE_EXPECTED_TURN]);
-    for (size_t k = 0; k < 3; ++k) {
-      const size_t at = 3 * i + k;
-      const double reference = (double)vertices[3 * begin + at];
-      const double moved[2] = {(double)block.x[EXPECTED_AT][at],
-                               (double)block.x[EXPECTED_FROM][at]};
-      f->at[k] = reference + moved[0];
-      f->place[k] = reference + moved[1];
-      if (m->per_step > 0) {
-        f->vector[0][k] = m->per_step * ((double)block.x[EXPECTED_FULLER][at] - moved[0] -
-                                         (double)block.x[EXPECTED_FULLER_FROM][at] + moved[1]);
-      }
-      if (k < 2 && m->across > 0) { /* the root of the term is its length across the body */
-        f->vector[1][k] = sqrt(square[SUPINE_EXPECTED_HEART]) * d->turn[state][k] / m->across;
-      }
+    *f = (supine_doubt_features){.state = state, .lung = lung};
+    find_features(d, begin, i, vertices + 3 * i, &block.formula, f);
+    if (d->location != NULL) {
+      follow_location(d->location, &block, i, f);
     }
-    f->vector[2][0] = EXPECTED_SLIDING * d->turn[state][0];
-    memcpy(f->vector[3], block.collapse[i], sizeof f->vector[3]);
   }
 }
 
@@ -185,32 +272,68 @@ void supine_doubt_evaluate_one(const supine_doubt *doubt, const supine_doubt_poi
   supine_doubt_evaluate(doubt, point->state, point->vertex, point->vertex + 1, features);
 }
 
-double supine_doubt_kernel(const supine_doubt_features *a, const supine_doubt_features *b) {
+double supine_doubt_kernel(const double a[3], size_t a_lung, const double b[3], size_t b_lung) {
   supine_kriging_model unit = supine_kriging_default;
   unit.sill = 3; /* so that a size of 1 has the variance 1 on each axis */
   unit.least = 0;
-  return supine_kriging_covariance(&unit, a->place, 1, b->place, 1, a->lung == b->lung);
+  return supine_kriging_covariance(&unit, a, 1, b, 1, a_lung == b_lung);
 }
 
-double supine_doubt_day_square(const supine_doubt *d) {
+double supine_doubt_common_square(const supine_doubt *d) {
   const double day = axis_share * (d->another_day ? SUPINE_ANOTHER_DAY_MM : 0);
-  return day * day;
+  return d->location != NULL ? d->location->excess / 3 : day * day;
 }
 
-double supine_doubt_isotropic(const supine_doubt *d, const supine_doubt_features *a,
-                              const supine_doubt_features *b) {
+void supine_doubt_whiten(const supine_doubt *doubt, const supine_doubt_features *features,
+                         double white[SUPINE_KRIGING_LANDMARKS_MAX]) {
+  if (doubt->seen != NULL) {
+    supine_kriging_whiten(doubt->seen, &features->seen, white);
+  }
+}
+
+void supine_doubt_covary(const supine_doubt *d, const supine_doubt_features *a,
+                         const double *a_white, const supine_doubt_features *b,
+                         const double *b_white, double covariance[9]) {
   double correlation = 0;
   for (size_t k = 0; k < d->state_count; ++k) {
     correlation += d->root[a->state][k] * d->root[b->state][k];
   }
-  return (a->deviation * b->deviation * correlation + supine_doubt_day_square(d)) *
-         supine_doubt_kernel(a, b);
+  const double plain = (a->deviation * b->deviation * correlation + supine_doubt_common_square(d)) *
+                       supine_doubt_kernel(a->place, a->lung, b->place, b->lung);
+  memset(covariance, 0, 9 * sizeof *covariance);
+  if (d->seen != NULL) {
+    supine_kriging_covary(d->seen, &a->seen, a_white, &b->seen, b_white, covariance);
+  }
+  for (size_t e = 0; e < 9; ++e) {
+    covariance[e] =
+        a->seen_factor * b->seen_factor * correlation * covariance[e] + (e % 4 == 0 ? plain : 0);
+  }
+}
+
+/* Compute the covariance of two points: that of supine_doubt_covary, and the products of their
+ * vectors; in the frame of the observations for located lungs. */
+static void covary(const supine_doubt *d, const supine_doubt_features *a, const double *a_white,
+                   const supine_doubt_features *b, double covariance[9]) {
+  static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double *r = d->location != NULL ? d->location->info.rotation : same;
+  double b_white[SUPINE_KRIGING_LANDMARKS_MAX];
+  double body[9];
+  supine_doubt_whiten(d, b, b_white);
+  supine_doubt_covary(d, a, a_white, b, b_white, body);
+  for (size_t e = 0; e < 9 * (size_t)DOUBT_VECTORS; ++e) {
+    body[e % 9] += a->vector[e / 9][e % 9 / 3] * b->vector[e / 9][e % 3];
+  }
+  memset(covariance, 0, 9 * sizeof *covariance);
+  for (size_t e = 0; e < 9 * 9; ++e) { /* R body R' */
+    covariance[e / 9] += r[e / 27 * 3 + e % 9 / 3] * body[e % 9] * r[e / 9 % 3 * 3 + e % 3];
+  }
 }
 
 supine_status supine_doubt_covariance(const supine_doubt *doubt, size_t count,
                                       const supine_doubt_point *points, double *mean,
                                       double *covariance, supine_error *error) {
   const size_t n = supine_basis_get_info(doubt->basis)->vertex_count;
+  double white[SUPINE_KRIGING_LANDMARKS_MAX];
   for (size_t i = 0; i < count; ++i) {
     if (points[i].vertex >= n || points[i].state >= doubt->state_count) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -222,22 +345,21 @@ supine_status supine_doubt_covariance(const supine_doubt *doubt, size_t count,
   for (size_t i = 0; i < count; ++i) {
     supine_doubt_features a;
     supine_doubt_evaluate_one(doubt, &points[i], &a);
+    supine_doubt_whiten(doubt, &a, white);
     if (mean != NULL) {
       memcpy(mean + 3 * i, a.at, sizeof a.at);
+      if (doubt->location != NULL) {
+        supine_location_move(doubt->location, a.at, mean + 3 * i);
+      }
     }
     for (size_t j = 0; j <= i; ++j) {
       supine_doubt_features b;
+      double block[9];
       supine_doubt_evaluate_one(doubt, &points[j], &b);
-      const double isotropic = supine_doubt_isotropic(doubt, &a, &b);
+      covary(doubt, &a, white, &b, block);
       for (size_t e = 0; e < 9; ++e) {
-        const size_t k = e / 3;
-        const size_t l = e % 3;
-        double sum = k == l ? isotropic : 0;
-        for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
-          sum += a.vector[v][k] * b.vector[v][l];
-        }
-        covariance[(3 * i + k) * 3 * count + 3 * j + l] = sum;
-        covariance[(3 * j + l) * 3 * count + 3 * i + k] = sum;
+        covariance[(3 * i + e / 3) * 3 * count + 3 * j + e % 3] = block[e];
+        covariance[(3 * j + e % 3) * 3 * count + 3 * i + e / 3] = block[e];
       }
     }
   }

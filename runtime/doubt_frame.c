@@ -30,12 +30,26 @@ struct supine_doubt_frame {
   double common[DOUBT_VECTORS][PARAMETERS]; /* y of each vector of the features */
   double rotation[9], translation[3];
   size_t count;
+  double *white;       /* [count, landmarks] of supine_doubt_whiten */
   fiducial fiducial[]; /* [count] */
 };
 
-size_t supine_doubt_frame_space(size_t count) {
+static size_t struct_space(size_t count) {
   const size_t bytes = sizeof(supine_doubt_frame) + count * sizeof(fiducial);
   return (bytes + sizeof(double) - 1) / sizeof(double);
+}
+
+size_t supine_doubt_frame_space(const supine_basis *basis, size_t count) {
+  return struct_space(count) + count * basis->landmark_count;
+}
+
+/* Return the covariance of one axis of a point and fiducial i; all axes are alike. */
+static double covary(const supine_doubt_frame *f, const supine_doubt_features *at,
+                     const double *white, size_t i) {
+  double covariance[9];
+  supine_doubt_covary(f->doubt, at, white, &f->fiducial[i].features,
+                      f->white + i * f->doubt->basis->landmark_count, covariance);
+  return covariance[0];
 }
 
 /* Return the smallest eigenvalue of a symmetric matrix. */
@@ -103,7 +117,7 @@ static void sum_errors(supine_doubt_frame *f) {
     const fiducial *a = &f->fiducial[i];
     for (size_t j = 0; j < f->count; ++j) {
       const fiducial *b = &f->fiducial[j];
-      const double c = supine_doubt_isotropic(f->doubt, &a->features, &b->features);
+      const double c = covary(f, &a->features, f->white + i * f->doubt->basis->landmark_count, j);
       for (size_t e = 0; e < PARAMETERS * PARAMETERS; ++e) {
         f->square[e / PARAMETERS][e % PARAMETERS] +=
             c * supine_dot(a->weight[e / PARAMETERS], b->weight[e % PARAMETERS]);
@@ -147,7 +161,13 @@ supine_status supine_doubt_frame_prepare(const supine_doubt *doubt, size_t count
                             count, count == 1 ? "" : "s", (int)SUPINE_DOUBT_FIDUCIALS_LEAST,
                             (int)SUPINE_DOUBT_FIDUCIALS_MAX);
   }
-  *f = (supine_doubt_frame){.doubt = doubt, .count = count};
+  if (doubt->location != NULL) {
+    return supine_error_set(
+        error, SUPINE_ERROR_UNSUPPORTED,
+        "located lungs are in the frame of the observations: they have no other "
+        "registration");
+  }
+  *f = (supine_doubt_frame){.doubt = doubt, .count = count, .white = space + struct_space(count)};
   for (size_t i = 0; i < count; ++i) {
     if (vertices[i] >= n) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -156,6 +176,8 @@ supine_status supine_doubt_frame_prepare(const supine_doubt *doubt, size_t count
     }
     const supine_doubt_point point = {vertices[i], 0};
     supine_doubt_evaluate_one(doubt, &point, &f->fiducial[i].features);
+    supine_doubt_whiten(doubt, &f->fiducial[i].features,
+                        f->white + i * doubt->basis->landmark_count);
     for (size_t k = 0; k < 3; ++k) {
       f->centre[k] += f->fiducial[i].features.place[k] / (double)count;
     }
@@ -192,10 +214,14 @@ static void apply(const double y[PARAMETERS], const double offset[3], double mov
 static double square_after(const supine_doubt_frame *f, const supine_doubt_features *target) {
   double offset[3];
   double cross[PARAMETERS][3] = {{0}};
-  double sum = 3 * supine_doubt_isotropic(f->doubt, target, target);
+  double white[SUPINE_KRIGING_LANDMARKS_MAX];
+  double own[9];
+  supine_doubt_whiten(f->doubt, target, white);
+  supine_doubt_covary(f->doubt, target, white, target, white, own);
+  double sum = 3 * own[0];
   supine_subtract(target->place, f->centre, offset);
   for (size_t i = 0; i < f->count; ++i) {
-    const double c = supine_doubt_isotropic(f->doubt, target, &f->fiducial[i].features);
+    const double c = covary(f, target, white, i);
     for (size_t e = 0; e < PARAMETERS * 3; ++e) {
       cross[e / 3][e % 3] += c * f->fiducial[i].weight[e / 3][e % 3];
     }

@@ -25,15 +25,25 @@ static const double exact = 10; /* mm^3: difference of a volume at which Newton'
 
 /* The gradients of a lung's volume, summed over the vertices in a cell of the lung's box. */
 typedef struct cell {
-  supine_doubt_features features; /* its place is the mean of the vertices', its deviation is 1 */
+  double place[3]; /* mean of the vertices', mm */
+  double seen[3];  /* the same of the places among what was observed, mm */
   double weight;
-  double scaled[3]; /* sum of deviation times gradient */
-  double plain[3];  /* sum of gradients */
+  double scaled[3];      /* sum of deviation times gradient */
+  double seen_scaled[3]; /* the same of the part of the error of which some was observed */
+  double plain[3];       /* sum of gradients */
 } cell;
+
+/* How the error of every vertex covaries with the volume of one lung. */
+typedef struct covariation {
+  size_t lung, used;                                /* number of cells */
+  double through[DOUBT_VECTORS];                    /* sum of gradients times each vector */
+  double weights[3 * SUPINE_KRIGING_LANDMARKS_MAX]; /* of what the observed points predict of it */
+  double terms[SUPINE_KRIGING_TERMS];
+} covariation;
 
 struct supine_doubt_mend {
   const supine_doubt *doubt;
-  size_t lungs, vertices;
+  size_t lungs, vertices; /* lungs whose volumes are held: none if points decided their volume */
   double volume[SUPINE_LUNGS_MAX];                    /* predicted, mm^3 */
   double factor[SUPINE_LUNGS_MAX * SUPINE_LUNGS_MAX]; /* Cholesky factor of g' C g */
   cell *cells;                                        /* [CELLS] of the lung at hand */
@@ -110,66 +120,114 @@ static size_t cell_of(const float *box, const double place[3]) {
   return at;
 }
 
-/* Sum the gradients of a lung's vertices in cells, and times each vector of the features.
- * @return the number of cells that have any, which then come first */
-static size_t gather(const supine_doubt_mend *m, size_t state, size_t lung,
-                     double through[DOUBT_VECTORS]) {
+/* Return the factor of the error of which some was observed, before it was, mm. */
+static double seen_deviation(const supine_doubt *d, const supine_doubt_features *f) {
+  return d->seen == NULL ? 0
+                         : f->seen_factor * supine_kriging_deviation(&d->seen->model, f->seen.size);
+}
+
+/* Add a vertex to its cell. */
+static void add_vertex(const supine_doubt_mend *m, const float *box, const float *gradient,
+                       const supine_doubt_features *f, covariation *c) {
+  cell *own = &m->cells[cell_of(box, f->place)];
+  const double g[3] = {(double)gradient[0], (double)gradient[1], (double)gradient[2]};
+  const double weight = supine_length(g);
+  const double seen = seen_deviation(m->doubt, f);
+  own->weight += weight;
+  for (size_t k = 0; k < 3; ++k) {
+    own->scaled[k] += f->deviation * g[k];
+    own->seen_scaled[k] += seen * g[k];
+    own->plain[k] += g[k];
+    own->place[k] += weight * f->place[k];
+    own->seen[k] += weight * f->seen.position[k];
+  }
+  for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
+    c->through[v] += supine_dot(f->vector[v], g);
+  }
+}
+
+/* Sum the gradients of a lung's vertices in cells, and times each vector of the features. The cells
+ * that have any then come first. */
+static void gather(const supine_doubt_mend *m, size_t state, covariation *c) {
   const supine_basis_info *info = supine_basis_get_info(m->doubt->basis);
   supine_doubt_features features[LOCATE_BLOCK];
-  const size_t end = info->lung_begin[lung + 1];
-  size_t used = 0;
+  const size_t end = info->lung_begin[c->lung + 1];
   memset(m->cells, 0, CELLS * sizeof *m->cells);
-  memset(through, 0, DOUBT_VECTORS * sizeof *through);
-  for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
+  memset(c->through, 0, sizeof c->through);
+  for (size_t at = info->lung_begin[c->lung]; at < end; at += LOCATE_BLOCK) {
     const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
     supine_doubt_evaluate(m->doubt, state, at, last, features);
-    for (size_t i = 0; i < last - at; ++i) {
-      const supine_doubt_features *f = &features[i];
-      cell *c = &m->cells[cell_of(info->bounds + 6 * lung, f->place)];
-      double g[3];
-      for (size_t k = 0; k < 3; ++k) {
-        g[k] = (double)m->gradient[3 * (at + i) + k];
-        c->scaled[k] += f->deviation * g[k];
-        c->plain[k] += g[k];
-      }
-      const double weight = supine_length(g);
-      c->weight += weight;
-      for (size_t k = 0; k < 3; ++k) {
-        c->features.place[k] += weight * f->place[k];
-      }
-      for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
-        through[v] += supine_dot(f->vector[v], g);
-      }
+    for (size_t i = at; i < last; ++i) {
+      add_vertex(m, info->bounds + 6 * c->lung, m->gradient + 3 * i, &features[i - at], c);
     }
   }
+  c->used = 0;
   for (size_t i = 0; i < CELLS; ++i) {
-    cell c = m->cells[i];
-    if (c.weight > 0) {
+    cell own = m->cells[i];
+    if (own.weight > 0) {
       for (size_t k = 0; k < 3; ++k) {
-        c.features.place[k] /= c.weight;
+        own.place[k] /= own.weight;
+        own.seen[k] /= own.weight;
       }
-      c.features.lung = lung;
-      m->cells[used++] = c;
+      m->cells[c->used++] = own;
     }
   }
-  return used;
+}
+
+/* Compute the covariance of the part of the error of which some was observed with a lung's volume,
+ * before it was, at a place where it has the variance 1 on each axis. */
+static void covary_seen(const supine_doubt_mend *m, const covariation *c,
+                        const supine_kriging_point *at, double sum[3]) {
+  memset(sum, 0, 3 * sizeof *sum);
+  for (size_t i = 0; i < c->used; ++i) {
+    const cell *own = &m->cells[i];
+    const double k = supine_doubt_kernel(at->position, at->lung, own->seen, c->lung);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      sum[axis] += k * own->seen_scaled[axis];
+    }
+  }
+}
+
+/* Find what the observed points would predict of these covariances. Translation and rotation do not
+ * change a volume, and a fitted volume is not held: terms add nothing. */
+static void see(const supine_doubt_mend *m, covariation *c) {
+  const supine_kriging *seen = m->doubt->seen;
+  for (size_t j = 0; j < seen->count; ++j) {
+    const supine_kriging_point *p = &seen->points[j];
+    double sum[3];
+    covary_seen(m, c, p, sum);
+    for (size_t k = 0; k < 3; ++k) {
+      c->weights[k * seen->count + j] = supine_kriging_deviation(&seen->model, p->size) * sum[k];
+    }
+  }
+  supine_kriging_refit(seen, c->weights, c->terms);
 }
 
 /* Compute the covariance of the error of a vertex with a lung's volume. */
-static void covary(const supine_doubt_mend *m, size_t used, const double *through,
-                   const supine_doubt_features *f, float *along) {
-  const double day = supine_doubt_day_square(m->doubt);
+static void covary(const supine_doubt_mend *m, const covariation *c, const supine_doubt_features *f,
+                   float *along) {
+  const supine_doubt *d = m->doubt;
+  const double common = supine_doubt_common_square(d);
   double sum[3] = {0};
-  for (size_t i = 0; i < used; ++i) {
-    const cell *c = &m->cells[i];
-    const double k = supine_doubt_kernel(f, &c->features);
+  for (size_t i = 0; i < c->used; ++i) {
+    const cell *own = &m->cells[i];
+    const double k = supine_doubt_kernel(f->place, f->lung, own->place, c->lung);
     for (size_t axis = 0; axis < 3; ++axis) {
-      sum[axis] += k * (f->deviation * c->scaled[axis] + day * c->plain[axis]);
+      sum[axis] += k * (f->deviation * own->scaled[axis] + common * own->plain[axis]);
+    }
+  }
+  if (d->seen != NULL) {
+    double before[3];
+    double shift[3];
+    covary_seen(m, c, &f->seen, before);
+    supine_kriging_shift(d->seen, c->weights, c->terms, &f->seen, shift);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      sum[axis] += seen_deviation(d, f) * before[axis] - f->seen_factor * shift[axis];
     }
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
-      sum[axis] += f->vector[v][axis] * through[v];
+      sum[axis] += f->vector[v][axis] * c->through[v];
     }
     along[axis] = (float)sum[axis];
   }
@@ -180,8 +238,11 @@ static void find_along(supine_doubt_mend *m, size_t state, size_t lung, double *
   const supine_basis_info *info = supine_basis_get_info(m->doubt->basis);
   float *along = m->along + 3 * m->vertices * lung;
   supine_doubt_features features[LOCATE_BLOCK];
-  double through[DOUBT_VECTORS];
-  const size_t used = gather(m, state, lung, through);
+  covariation c = {.lung = lung};
+  gather(m, state, &c);
+  if (m->doubt->seen != NULL) {
+    see(m, &c);
+  }
   for (size_t other = 0; other < m->lungs; ++other) {
     const size_t end = info->lung_begin[other + 1];
     products[other] = 0;
@@ -189,11 +250,27 @@ static void find_along(supine_doubt_mend *m, size_t state, size_t lung, double *
       const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
       supine_doubt_evaluate(m->doubt, state, at, last, features);
       for (size_t i = at; i < last; ++i) {
-        covary(m, used, through, &features[i - at], along + 3 * i);
+        covary(m, &c, &features[i - at], along + 3 * i);
         for (size_t k = 0; k < 3; ++k) {
           products[other] += (double)along[3 * i + k] * (double)m->gradient[3 * i + k];
         }
       }
+    }
+  }
+}
+
+/* Compute the predicted positions, and the volumes that samples are to have: those of the state,
+ * which the surface of located lungs has only nearly. */
+static void predict(supine_doubt_mend *m, size_t state) {
+  const supine_doubt *d = m->doubt;
+  const supine_basis_info *info = supine_basis_get_info(d->basis);
+  (void)supine_deform(d->basis, &d->model[state].pose[EXPECTED_AT], m->predicted);
+  find_volumes(d->basis, m->predicted, m->volume);
+  if (d->location != NULL) {
+    const double none[DOUBT_VECTORS] = {0};
+    memset(m->predicted, 0, 3 * m->vertices * sizeof *m->predicted);
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      supine_doubt_add_positions(d, state, lung, none, m->predicted);
     }
   }
 }
@@ -211,13 +288,13 @@ supine_status supine_doubt_mend_prepare(const supine_doubt *doubt, size_t state,
   if (!info->has_volume || supine_basis_metadata(doubt->basis, "content") != NULL) {
     return SUPINE_OK;
   }
-  *m = (supine_doubt_mend){.doubt = doubt, .lungs = info->lung_count, .vertices = n};
+  const bool held = doubt->location == NULL || !doubt->location->options.volume;
+  *m = (supine_doubt_mend){.doubt = doubt, .lungs = held ? info->lung_count : 0, .vertices = n};
   m->cells = (cell *)(m + 1);
   m->predicted = (float *)(m->cells + CELLS);
   m->gradient = m->predicted + 3 * n;
   m->along = m->gradient + 3 * n;
-  (void)supine_deform(doubt->basis, &doubt->model[state].pose[EXPECTED_AT], m->predicted);
-  find_volumes(doubt->basis, m->predicted, m->volume);
+  predict(m, state);
   find_gradient(doubt->basis, m->predicted, m->gradient);
   for (size_t lung = 0; lung < m->lungs; ++lung) {
     find_along(m, state, lung, m->factor + m->lungs * lung);
@@ -225,6 +302,10 @@ supine_status supine_doubt_mend_prepare(const supine_doubt *doubt, size_t state,
   for (size_t e = 0; e < m->lungs * m->lungs; ++e) { /* symmetric but for the cells */
     double *pair[2] = {&m->factor[e], &m->factor[e % m->lungs * m->lungs + e / m->lungs]};
     *pair[0] = *pair[1] = 0.5 * (*pair[0] + *pair[1]);
+  }
+  if (doubt->location != NULL) { /* from here on, in the frame of the observations */
+    supine_location_move_all(doubt->location, n, m->predicted);
+    supine_location_turn_all(doubt->location, n * m->lungs, m->along);
   }
   if (supine_kriging_factor(m->lungs, m->factor)) {
     *mend = m;

@@ -89,18 +89,121 @@ static void add_pair(const pair *p, double factor, const double place[3], double
   add_waves(p->own, factor * sqrt(1 - across), place, error);
 }
 
-/* Add the errors of one part, a component of the states or another day, to the vertices of a lung.
- */
-static void add_part(const supine_doubt *d, const supine_doubt_features *features, size_t count,
-                     size_t part, const pair *p, float *xyz) {
-  const double day = sqrt(supine_doubt_day_square(d));
-  for (size_t i = 0; i < count; ++i) {
-    const supine_doubt_features *f = &features[i];
-    const double factor = part == d->state_count ? day : f->deviation * d->root[f->state][part];
-    double error[3] = {0};
-    add_pair(p, factor, f->place, error);
-    for (size_t k = 0; k < 3; ++k) {
-      xyz[3 * i + k] += (float)error[k];
+/* What the observed points would predict of a random field. */
+typedef struct prediction {
+  double weights[AXES * SUPINE_KRIGING_LANDMARKS_MAX];
+  double terms[SUPINE_KRIGING_TERMS]; /* fitted minus drawn */
+} prediction;
+
+/* Draw the terms of located lungs: volume, rotation, and how far away they are. */
+static void draw_terms(const supine_kriging_options *options, uint64_t *stream,
+                       double terms[SUPINE_KRIGING_TERMS]) {
+  const double far = options->axis_deviation * next_normal(stream);
+  for (size_t k = 0; k < AXES; ++k) {
+    terms[k] = far * options->axis[k];
+    terms[4 + k] = options->rotation ? options->rotation_deviation * next_normal(stream) : 0;
+  }
+  terms[3] = options->volume ? next_normal(stream) : 0;
+}
+
+/* Draw what is seen of a field at the observed points, with noise, and find what it predicts. */
+static void see(const supine_doubt *d, uint64_t seed, size_t index, size_t part,
+                prediction *found) {
+  const supine_kriging *seen = d->seen;
+  const size_t lungs = supine_basis_get_info(d->basis)->lung_count;
+  double drawn[SUPINE_KRIGING_TERMS] = {0};
+  uint64_t stream = begin_stream(seed, index, UINT64_MAX - 2 - part);
+  if (d->location != NULL) {
+    draw_terms(&d->location->options, &stream, drawn);
+  }
+  for (size_t lung = 0; lung <= lungs; ++lung) { /* the last: landmarks in no lung of the basis */
+    pair p;
+    draw_pair(seed, index, part, lung, &p);
+    for (size_t j = 0; j < seen->count; ++j) {
+      const supine_kriging_point *point = &seen->points[j];
+      double moved[AXES];
+      double error[AXES] = {0};
+      if (point->lung < lungs ? point->lung != lung : lung != lungs) {
+        continue;
+      }
+      supine_kriging_move(seen, drawn, point, moved);
+      add_pair(&p, supine_kriging_deviation(&seen->model, point->size), point->position, error);
+      for (size_t k = 0; k < AXES; ++k) {
+        found->weights[k * seen->count + j] =
+            error[k] + moved[k] + point->noise * next_normal(&stream);
+      }
+    }
+  }
+  supine_kriging_refit(seen, found->weights, found->terms);
+  for (size_t k = 0; k < SUPINE_KRIGING_TERMS; ++k) {
+    found->terms[k] -= drawn[k];
+  }
+}
+
+/* The parts of a sample are random fields of their own: for each state a component of the errors of
+ * which nothing was observed; the error that is the same everywhere; and from first_seen on, for
+ * each state, a component of the errors of which some was observed. */
+static size_t first_seen(const supine_doubt *d) {
+  return d->state_count + 1;
+}
+
+static bool has_part(const supine_doubt *d, size_t state, size_t part) {
+  if (part == d->state_count) {
+    return supine_doubt_common_square(d) > 0;
+  }
+  if (part > d->state_count) {
+    return d->seen != NULL;
+  }
+  return d->seen == NULL || (d->location == NULL && d->model[state].turn > 0);
+}
+
+/* Add a part to the errors of the vertices of a lung.
+ * @param seen  what is subtracted from a part of which some was observed */
+static void add_part(const supine_doubt *d, size_t state, size_t part, size_t lung, const pair *p,
+                     const prediction *seen, float *xyz) {
+  const supine_basis_info *info = supine_basis_get_info(d->basis);
+  const size_t end = info->lung_begin[lung + 1];
+  supine_doubt_features features[LOCATE_BLOCK];
+  for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
+    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
+    supine_doubt_evaluate(d, state, at, last, features);
+    for (size_t i = at; i < last; ++i) {
+      const supine_doubt_features *f = &features[i - at];
+      double error[AXES] = {0};
+      double shift[AXES] = {0};
+      double factor = 1;
+      if (part < d->state_count) {
+        add_pair(p, f->deviation * d->root[state][part], f->place, error);
+      } else if (part == d->state_count) {
+        add_pair(p, sqrt(supine_doubt_common_square(d)), f->place, error);
+      } else {
+        factor = f->seen_factor * d->root[state][part - first_seen(d)];
+        add_pair(p, supine_kriging_deviation(&d->seen->model, f->seen.size), f->seen.position,
+                 error);
+        supine_kriging_shift(d->seen, seen->weights, seen->terms, &f->seen, shift);
+      }
+      for (size_t k = 0; k < AXES; ++k) {
+        xyz[3 * i + k] += (float)(factor * (error[k] - shift[k]));
+      }
+    }
+  }
+}
+
+void supine_doubt_add_positions(const supine_doubt *d, size_t state, size_t lung,
+                                const double factor[DOUBT_VECTORS], float *xyz) {
+  const supine_basis_info *info = supine_basis_get_info(d->basis);
+  const size_t end = info->lung_begin[lung + 1];
+  supine_doubt_features features[LOCATE_BLOCK];
+  for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
+    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
+    supine_doubt_evaluate(d, state, at, last, features);
+    for (size_t e = 3 * at; e < 3 * last; ++e) {
+      const supine_doubt_features *f = &features[e / 3 - at];
+      double sum = f->at[e % 3];
+      for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
+        sum += factor[v] * f->vector[v][e % 3];
+      }
+      xyz[e] += (float)sum;
     }
   }
 }
@@ -108,7 +211,6 @@ static void add_part(const supine_doubt *d, const supine_doubt_features *feature
 supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint64_t seed,
                                   size_t index, float *xyz, supine_error *error) {
   const supine_basis_info *info = supine_basis_get_info(doubt->basis);
-  supine_doubt_features features[LOCATE_BLOCK];
   double factor[DOUBT_VECTORS]; /* of assumed volume, heart, sliding and collapse */
   if (state >= doubt->state_count) {
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "state %zu: give one below %zu", state,
@@ -118,34 +220,26 @@ supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint6
   for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
     factor[v] = next_normal(&stream);
   }
-  const size_t parts = doubt->state_count + (doubt->another_day ? 1 : 0);
-  for (size_t lung = 0; lung < info->lung_count; ++lung) {
-    const size_t end = info->lung_begin[lung + 1];
-    for (size_t part = 0; part <= parts; ++part) { /* the last: positions and vectors */
-      pair p;
-      if (part < parts) {
-        draw_pair(seed, index, part, lung, &p);
-      }
-      for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
-        const size_t count = end - at < LOCATE_BLOCK ? end - at : LOCATE_BLOCK;
-        supine_doubt_evaluate(doubt, state, at, at + count, features);
-        if (part == 0) {
-          memset(xyz + 3 * at, 0, 3 * count * sizeof *xyz);
-        }
-        if (part < parts) {
-          add_part(doubt, features, count, part, &p, xyz + 3 * at);
-          continue;
-        }
-        for (size_t e = 0; e < 3 * count; ++e) {
-          const supine_doubt_features *f = &features[e / 3];
-          double sum = f->at[e % 3];
-          for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
-            sum += factor[v] * f->vector[v][e % 3];
-          }
-          xyz[3 * at + e] += (float)sum;
-        }
-      }
+  memset(xyz, 0, 3 * info->vertex_count * sizeof *xyz);
+  for (size_t part = 0; part <= 2 * doubt->state_count; ++part) {
+    prediction seen;
+    if (!has_part(doubt, state, part)) {
+      continue;
     }
+    if (part >= first_seen(doubt)) {
+      see(doubt, seed, index, part, &seen);
+    }
+    for (size_t lung = 0; lung < info->lung_count; ++lung) {
+      pair p;
+      draw_pair(seed, index, part, lung, &p);
+      add_part(doubt, state, part, lung, &p, &seen, xyz);
+    }
+  }
+  for (size_t lung = 0; lung < info->lung_count; ++lung) {
+    supine_doubt_add_positions(doubt, state, lung, factor, xyz);
+  }
+  if (doubt->location != NULL) {
+    supine_location_move_all(doubt->location, info->vertex_count, xyz);
   }
   supine_rigid_restore(doubt->basis, xyz);
   return SUPINE_OK;

@@ -34,6 +34,25 @@ double supine_expected_constant(const supine_basis *basis) {
   return number_of(basis, "expected_error_mm", SUPINE_EXPECTED_ERROR_MM);
 }
 
+size_t supine_expected_landmark_count(const supine_basis *basis) {
+  return basis->landmark_count;
+}
+
+double supine_expected_held_out(const supine_basis *basis) {
+  return basis->held_out;
+}
+
+supine_status supine_expected_fit_landmarks(const supine_basis *basis, supine_kriging_point *seen,
+                                            double *space, supine_kriging *fit,
+                                            supine_error *error) {
+  for (size_t i = 0; i < basis->landmark_count; ++i) {
+    const float *number = basis->landmarks + 4 * i;
+    const double place[3] = {(double)number[0], (double)number[1], (double)number[2]};
+    seen[i] = supine_kriging_landmark(place, (size_t)fmaxf(0, fminf(number[3], SUPINE_LUNGS_MAX)));
+  }
+  return supine_kriging_fit_landmarks(basis->landmark_count, seen, space, fit, error);
+}
+
 double supine_expected_reference(const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   double sum = 0;

@@ -29,6 +29,20 @@ enum { LOCATE_BLOCK = 256 }; /**< number of vertices evaluated at once */
  * metadata "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */
 double supine_expected_constant(const supine_basis *basis);
 
+/** Return the number of landmarks of a patient's fit that the file keeps. */
+size_t supine_expected_landmark_count(const supine_basis *basis);
+
+/** Return the mean share of the error's variance that the landmarks leave at points that were held
+ * out of the fit: the unit of the tensor "error_share". */
+double supine_expected_held_out(const supine_basis *basis);
+
+/** Fit the random field of the error to the landmarks (supine_kriging_fit_landmarks).
+ * @param seen   [landmarks] written; keep them as long as the fit is used
+ * @param space  [supine_kriging_space(landmarks)]; keep it as long as the fit is used */
+supine_status supine_expected_fit_landmarks(const supine_basis *basis, supine_kriging_point *seen,
+                                            double *space, supine_kriging *fit,
+                                            supine_error *error);
+
 /** Limits of the 95 % interval of SUPINE_EXPECTED_ERROR_MM, mm. */
 #define EXPECTED_ERROR_LOW 3.7
 #define EXPECTED_ERROR_HIGH 5.7
@@ -80,8 +94,8 @@ typedef struct supine_expected_model {
   double rms;      /**< RMS displacement of the lungs, mm */
   double across;   /**< length of the change of unit gravity in the x-y plane */
   double sideways; /**< length of the change of unit gravity along x */
-  /** Of each lung, in EXPECTED_AT and EXPECTED_FROM: e of the formula, 0 if it is not collapsed, and
-   * the position of its hilum, mm. */
+  /** Of each lung, in EXPECTED_AT and EXPECTED_FROM: e of the formula, 0 if it is not collapsed,
+   * and the position of its hilum, mm. */
   double collapse[SUPINE_LUNGS_MAX][2], hilum[SUPINE_LUNGS_MAX][2][3];
   /** If not 0, the squared errors are those of the displacement minus the mean displacement of the
    * anchors, of which each lung has one. */

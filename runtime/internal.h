@@ -97,6 +97,11 @@ struct supine_basis {
   /** [vertices] variance that a fit's landmarks leave, divided by its mean at points that were held
    * out; NULL if the file has none */
   const float *error_share;
+  /** [landmark_count, 4] places of a fit's landmarks in the reference surface, mm, and the lung of
+   * each; NULL if the file has none */
+  const float *landmarks;
+  size_t landmark_count;
+  double held_out;       /**< mean variance that landmarks leave at points that were held out */
   bool allow_folds;      /**< poses are not checked by `volume_range` */
   const uint32_t *rigid; /**< [rigid_count, 2] begin and end of the vertices of each rigid part */
   size_t rigid_count;

@@ -47,7 +47,7 @@ static double dot(size_t count, const double *a, const double *b) {
 }
 
 static bool is_known(const supine_kriging_options *options, size_t term) {
-  return term == 3 ? !options->volume : term > 3 && !options->rotation;
+  return options->field_only || (term == 3 ? !options->volume : term > 3 && !options->rotation);
 }
 
 /* Return the inverse of the prior variance of a term, or 0 if it has no prior. Write its prior
@@ -170,21 +170,6 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
   }
 }
 
-static void find_weights(supine_kriging *fit) {
-  const size_t n = fit->count;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    double *weights = fit->weights + axis * n;
-    memcpy(weights, fit->whitened + (VALUE + axis) * n, n * sizeof *weights);
-    for (size_t k = 0; k < TERMS; ++k) {
-      double sign = 0;
-      const double *x = fit->whitened + (size_t)supine_kriging_column(k, axis, &sign) * n;
-      for (size_t j = 0; j < n; ++j) {
-        weights[j] -= sign * fit->terms[k] * x[j];
-      }
-    }
-  }
-}
-
 static supine_status refuse_covariance(supine_error *error) {
   return supine_error_set(error, SUPINE_ERROR_NUMERICAL,
                           "the points' covariance is not positive definite: give each point "
@@ -235,8 +220,11 @@ static double find_likelihood(const supine_kriging *fit, const supine_kriging_op
 supine_status supine_kriging_fit(const supine_kriging_options *options, size_t count,
                                  const supine_kriging_point *points, double *space,
                                  supine_kriging *fit, supine_error *error) {
-  *fit =
-      (supine_kriging){.model = options->model, .points = points, .count = count, .factor = space};
+  *fit = (supine_kriging){.model = options->model,
+                          .points = points,
+                          .count = count,
+                          .has_terms = !options->field_only,
+                          .factor = space};
   fit->whitened = space + count * count;
   fit->weights = fit->whitened + SUPINE_KRIGING_COLUMNS * count;
   fit->lines = fit->weights + 3 * count;
@@ -271,10 +259,11 @@ supine_status supine_kriging_fit(const supine_kriging_options *options, size_t c
                             "or fit only a translation");
   }
   solve_terms(fit, options, factor, right);
-  find_weights(fit);
+  memcpy(fit->weights, fit->whitened + VALUE * count, 3 * count * sizeof *fit->weights);
   if (fit->lines != NULL) {
-    supine_kriging_weigh_lines(fit, scratch);
+    memcpy(scratch, fit->along + TERMS * count, count * sizeof *scratch);
   }
+  supine_kriging_subtract_terms(fit, fit->terms, scratch, fit->weights);
   fit->log_likelihood = find_likelihood(fit, options, factor, right);
   return SUPINE_OK;
 }

@@ -38,7 +38,8 @@
 
 enum {
   SUPINE_KRIGING_POINTS_MAX = 300,
-  SUPINE_KRIGING_TERMS = 7, /**< fitted numbers: 3 translation, 1 volume, 3 rotation */
+  SUPINE_KRIGING_LANDMARKS_MAX = 900, /**< of supine_kriging_fit_landmarks */
+  SUPINE_KRIGING_TERMS = 7,           /**< fitted numbers: 3 translation, 1 volume, 3 rotation */
   SUPINE_KRIGING_COLUMNS = 10,
   SUPINE_KRIGING_LEFT_MAX = 4 /**< views of one point that are left out together */
 };
@@ -66,11 +67,12 @@ typedef struct supine_kriging_point {
   double direction[3]; /**< unit vector of the line; 0 for a point */
 } supine_kriging_point;
 
-/** Options of a fit. A translation is always fitted. `volume` and `rotation` tell whether to fit a
- * change of the volume of the lungs, and a rotation, too. */
+/** Options of a fit. A translation is fitted unless `field_only`. `volume` and `rotation` tell
+ * whether to fit a change of the volume of the lungs, and a rotation, too. */
 typedef struct supine_kriging_options {
   supine_kriging_model model;
   bool volume, rotation;
+  bool field_only;    /**< fit no term at all, not even a translation */
   double volume_mean; /**< prior mean of the change of the volume, in prior standard deviations */
   double rotation_mean[3];   /**< prior mean of the rotation vector, rad */
   double rotation_deviation; /**< prior standard deviation about each axis, rad; 0 for no prior */
@@ -83,6 +85,7 @@ typedef struct supine_kriging {
   supine_kriging_model model;
   const supine_kriging_point *points; /**< [count] observed points, owned by the caller */
   size_t count;
+  bool has_terms;   /**< whether any term is fitted */
   double centre[3]; /**< mean position of the points, mm */
   double *factor;   /**< [count, count] lower triangle L of the covariance matrix L L' */
   /** [SUPINE_KRIGING_COLUMNS, count] the matrix L^-1 X, transposed, with L in `factor`. Row j of X
@@ -133,6 +136,12 @@ static inline double supine_kriging_covariance(const supine_kriging_model *model
   return model->sill / 3.0 * sqrt(sizes) * (same_lung ? 1.0 : model->across) * (1.0 + a) * e;
 }
 
+/** Return the standard deviation of one coordinate of the random field where the displacement from
+ * the scan has the length `size`, mm. */
+static inline double supine_kriging_deviation(const supine_kriging_model *model, double size) {
+  return sqrt(model->sill / 3.0 * (size > model->least ? size : model->least));
+}
+
 /** Factor a symmetric positive definite matrix [count, count] as L L', and write L into its lower
  * triangle. Return false if the matrix is not positive definite. */
 bool supine_kriging_factor(size_t count, double *matrix);
@@ -154,8 +163,17 @@ int supine_kriging_column(size_t term, size_t axis, double *sign);
  * @return whether the points' covariance is positive definite */
 bool supine_kriging_add_lines(supine_kriging *fit, double *scratch);
 
-/** Subtract from `weights` what the fitted positions of the points along their lines contribute. */
-void supine_kriging_weigh_lines(supine_kriging *fit, double *scratch);
+/** Compute G^-1 D' K^-1 y for residuals y.
+ * @param whitened  [3, count] L^-1 y
+ * @param seen      [count] written */
+void supine_kriging_see_lines(const supine_kriging *fit, const double *whitened, double *seen);
+
+/** Subtract from `weights` [3, count], L^-1 times residuals, what fitted terms contribute, and the
+ * positions along lines that then fit best.
+ * @param seen  [count] of supine_kriging_see_lines, for points on lines; replaced */
+void supine_kriging_subtract_terms(const supine_kriging *fit,
+                                   const double terms[SUPINE_KRIGING_TERMS], double *seen,
+                                   double *weights);
 
 /** Compute G^-1 D' (weights e_a) for the unit vector e_a of each axis; G and D as in
  * supine_kriging.lines.
@@ -209,22 +227,51 @@ typedef struct supine_kriging_target {
 void supine_kriging_predict(const supine_kriging *fit, const supine_kriging_target *target,
                             float *shift, float *variance);
 
-/** A place where the field was observed, or is asked for. */
-typedef struct supine_kriging_place {
-  double position[3]; /**< mm */
-  size_t lung;
-} supine_kriging_place;
+/** Compute L^-1 k for a place: k are the covariances of one coordinate of the field there with
+ * those at the observed points, L is supine_kriging.factor.
+ * @param at     its position, size, volume and lung count
+ * @param white  [count] written */
+void supine_kriging_whiten(const supine_kriging *fit, const supine_kriging_point *at,
+                           double *white);
 
-/** Factor the covariance of places that were observed, of a field with the variance 1 everywhere,
- * the correlation of supine_kriging_default, and noise of a tenth of its variance.
- * @param factor  [count, count] written
- * @return false if it is not positive definite */
-bool supine_kriging_share_prepare(size_t count, const supine_kriging_place *seen, double *factor);
+/** Compute the covariance of the errors of the predictions at two places, mm^2.
+ * @param a_white, b_white  [count] of supine_kriging_whiten
+ * @param covariance        [3, 3] by rows, written */
+void supine_kriging_covary(const supine_kriging *fit, const supine_kriging_point *a,
+                           const double *a_white, const supine_kriging_point *b,
+                           const double *b_white, double covariance[9]);
 
-/** Return the share of the field's variance that the observed places leave at another one, by
- * simple kriging: 1 - k' K^-1 k, 0 to 1 (Rasmussen & Williams 2006, equation 2.26).
+/** Compute by how much terms move a place: t + b v + r x (p - c) of the top of this file. */
+void supine_kriging_move(const supine_kriging *fit, const double terms[SUPINE_KRIGING_TERMS],
+                         const supine_kriging_point *at, double moved[3]);
+
+/** Predict from other residuals of the same points, whose terms have the prior mean 0.
+ * @param residuals  [3, count] mm; replaced by the weights of supine_kriging_shift
+ * @param terms      fitted terms, written */
+void supine_kriging_refit(const supine_kriging *fit, double *residuals,
+                          double terms[SUPINE_KRIGING_TERMS]);
+
+/** Compute what the weights and terms of supine_kriging_refit predict at a place, mm. */
+void supine_kriging_shift(const supine_kriging *fit, const double *weights,
+                          const double terms[SUPINE_KRIGING_TERMS], const supine_kriging_point *at,
+                          double shift[3]);
+
+/** Return a landmark of a patient's fit as an observed point of supine_kriging_fit_landmarks, or
+ * another place of that field. */
+supine_kriging_point supine_kriging_landmark(const double position[3], size_t lung);
+
+/** Fit the random field of the errors after a patient's fit, which has the variance 1 everywhere
+ * before its landmarks are known, the correlation of supine_kriging_default, and noise of a tenth
+ * of its variance. No term is fitted.
+ * @param landmarks  [count] of supine_kriging_landmark; keep them as long as the fit is used
+ * @param space      [supine_kriging_space(count)]; keep it as long as the fit is used */
+supine_status supine_kriging_fit_landmarks(size_t count, const supine_kriging_point *landmarks,
+                                           double *space, supine_kriging *fit, supine_error *error);
+
+/** Return the share of the field's variance that landmarks leave at a place, by simple kriging:
+ * 1 - k' K^-1 k, 0 to 1 (Rasmussen & Williams 2006, equation 2.26).
  * @param scratch  [count] work space */
-double supine_kriging_share(size_t count, const supine_kriging_place *seen, const double *factor,
-                            const supine_kriging_place *at, double *scratch);
+double supine_kriging_share(const supine_kriging *fit, const supine_kriging_point *at,
+                            double *scratch);
 
 #endif

@@ -69,23 +69,44 @@ bool supine_kriging_add_lines(supine_kriging *fit, double *scratch) {
   return true;
 }
 
-void supine_kriging_weigh_lines(supine_kriging *fit, double *scratch) {
+void supine_kriging_see_lines(const supine_kriging *fit, const double *whitened, double *seen) {
   const size_t n = fit->count;
-  double far[SUPINE_KRIGING_POINTS_MAX]; /* how far along its line each point lies, mm */
-  for (size_t j = 0; j < n; ++j) {
-    far[j] = fit->along[TERMS * n + j];
-    for (size_t k = 0; k < TERMS; ++k) {
-      far[j] -= fit->terms[k] * fit->along[k * n + j];
+  double value[SUPINE_KRIGING_POINTS_MAX];
+  memset(seen, 0, n * sizeof *seen);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    memcpy(value, whitened + axis * n, n * sizeof *value);
+    supine_kriging_backward(n, fit->factor, value);
+    gather(fit, axis, 1, value, seen);
+  }
+  supine_kriging_forward(n, fit->lines, seen);
+}
+
+void supine_kriging_subtract_terms(const supine_kriging *fit,
+                                   const double terms[SUPINE_KRIGING_TERMS], double *seen,
+                                   double *weights) {
+  const size_t n = fit->count;
+  double along[SUPINE_KRIGING_POINTS_MAX];
+  for (size_t e = 0; e < 3 * TERMS; ++e) {
+    double sign = 0;
+    const size_t column = (size_t)supine_kriging_column(e % TERMS, e / TERMS, &sign);
+    for (size_t j = 0; j < n; ++j) {
+      weights[e / TERMS * n + j] -= sign * terms[e % TERMS] * fit->whitened[column * n + j];
     }
   }
-  supine_kriging_backward(n, fit->lines, far);
+  if (fit->lines == NULL) {
+    return;
+  }
+  for (size_t e = 0; e < TERMS * n; ++e) {
+    seen[e % n] -= terms[e / n] * fit->along[e];
+  }
+  supine_kriging_backward(n, fit->lines, seen);
   for (size_t axis = 0; axis < 3; ++axis) {
     for (size_t j = 0; j < n; ++j) {
-      scratch[j] = fit->points[j].on_line ? fit->points[j].direction[axis] * far[j] : 0;
+      along[j] = fit->points[j].on_line ? fit->points[j].direction[axis] * seen[j] : 0;
     }
-    supine_kriging_forward(n, fit->factor, scratch);
+    supine_kriging_forward(n, fit->factor, along);
     for (size_t j = 0; j < n; ++j) {
-      fit->weights[axis * n + j] -= scratch[j];
+      weights[axis * n + j] -= along[j];
     }
   }
 }

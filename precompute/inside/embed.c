@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "base/remedy.h"
 #include "base/vec3.h"
-#include "runtime/kriging.h"
+#include "runtime/expected.h"
 #include "runtime/rigid.h"
 
 #include "precompute/inside/anatomy.h"
@@ -487,22 +487,18 @@ static supine_status write_file(const embedding *e, const char *path, supine_ten
 
 typedef struct sharing {
   const embedding *e;
-  size_t count;                     /* number of landmarks */
-  const supine_kriging_place *seen; /* [count] */
-  const double *factor;             /* [count, count] */
-  double *scratch;                  /* [threads, count] */
-  double held_out;                  /* mean share at landmarks that were held out */
+  supine_kriging fit; /* to the landmarks */
+  double *scratch;    /* [threads, landmarks] */
+  double held_out;    /* mean share at landmarks that were held out */
 } sharing;
 
 static void share_range(void *context, size_t begin, size_t end, size_t thread) {
   const sharing *s = context;
   for (size_t i = begin; i < end; ++i) {
-    supine_kriging_place at = {.lung = s->e->group[i]};
-    for (size_t k = 0; k < 3; ++k) {
-      at.position[k] = (double)s->e->vertices[3 * i + k];
-    }
-    const double share =
-        supine_kriging_share(s->count, s->seen, s->factor, &at, s->scratch + thread * s->count);
+    const float *p = s->e->vertices + 3 * i;
+    const double place[3] = {(double)p[0], (double)p[1], (double)p[2]};
+    const supine_kriging_point at = supine_kriging_landmark(place, s->e->group[i]);
+    const double share = supine_kriging_share(&s->fit, &at, s->scratch + thread * s->fit.count);
     s->e->error_share[i] = (float)(share / s->held_out);
   }
 }
@@ -511,35 +507,19 @@ static void share_range(void *context, size_t begin, size_t end, size_t thread) 
  */
 static supine_status share_errors(embedding *e, supine_error *error) {
   enum { GRAIN = 64 };
-  const supine_tensor *landmarks = supine_basis_tensor(e->shells->basis, "landmarks");
-  const char *text = supine_basis_metadata(e->shells->basis, "expected_error_share");
-  if (landmarks == NULL) {
+  const supine_basis *lungs = e->shells->basis;
+  const size_t n = supine_expected_landmark_count(lungs);
+  if (n == 0) {
     e->error_share = NULL;
     return SUPINE_OK;
   }
-  sharing s = {.e = e,
-               .count = landmarks->shape[0],
-               .held_out = text == NULL ? 0.0 : supine_number_parse(text, NULL)};
-  const bool valid = landmarks->dtype == SUPINE_F32 && landmarks->rank == 2 &&
-                     landmarks->shape[1] == 4 && s.held_out > 0.0;
+  sharing s = {.e = e, .held_out = supine_expected_held_out(lungs)};
   SUPINE_ARENA arena = {0};
-  supine_kriging_place *seen = supine_arena_take(&arena, s.count, sizeof *seen);
-  double *factor = supine_arena_take(&arena, s.count, s.count * sizeof *factor);
-  s.scratch = supine_arena_take(&arena, supine_thread_count(), s.count * sizeof *s.scratch);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", s.count));
-  const float *number = landmarks->data;
-  if (valid) {
-    for (size_t i = 0; i < s.count; ++i, number += 4) {
-      seen[i] = (supine_kriging_place){
-          .position = {(double)number[0], (double)number[1], (double)number[2]},
-          .lung = (size_t)fmaxf(0.0F, fminf(number[3], SUPINE_LUNGS_MAX))};
-    }
-  }
-  const bool usable = valid && supine_kriging_share_prepare(s.count, seen, factor);
-  SUPINE_REFUSE_IF(!usable, error, SUPINE_ERROR_FORMAT,
-                   "the landmarks in the basis are malformed: make the basis again");
-  s.seen = seen;
-  s.factor = factor;
+  supine_kriging_point *seen = supine_arena_take(&arena, n, sizeof *seen);
+  double *space = supine_arena_take(&arena, supine_kriging_space(n), sizeof *space);
+  s.scratch = supine_arena_take(&arena, supine_thread_count(), n * sizeof *s.scratch);
+  SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", n));
+  SUPINE_TRY(supine_expected_fit_landmarks(lungs, seen, space, &s.fit, error));
   supine_parallel_for(e->content->count, GRAIN, 0, share_range, &s);
   return SUPINE_OK;
 }
@@ -547,7 +527,8 @@ static supine_status share_errors(embedding *e, supine_error *error) {
 /* Tensors of the lungs' basis that the file takes over. */
 static const char *const shared[] = {
     "modes",        "volume_linear", "volume_quadratic", "volume_cubic",     "resting_volume",
-    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares"};
+    "volume_range", "full_volume",   "simulated_range",  "simulated_limits", "simulated_shares",
+    "landmarks"};
 
 static supine_status write_content(const embedding *e, const char *path, supine_error *error) {
   const supine_inside_content *content = e->content;
@@ -566,7 +547,7 @@ static supine_status write_content(const embedding *e, const char *path, supine_
     const double x = (double)info->bounds[i];
     *corner = i < 6 || (i / 3 % 2 == 0 ? x < *corner : x > *corner) ? x : *corner;
   }
-  supine_tensor tensors[23] = {
+  supine_tensor tensors[24] = {
       {"vertices", SUPINE_F32, 2, {n, 3}, e->vertices},
       {"triangles", SUPINE_U32, 2, {content->triangle_count, 3}, e->triangles},
       {"lung", SUPINE_U8, 1, {n}, e->group},

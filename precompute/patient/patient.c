@@ -217,22 +217,19 @@ supine_status supine_patient_shares(const supine_patient *patient, size_t count,
                                     supine_error *error) {
   const size_t n = patient->landmark_count;
   SUPINE_ARENA arena = {0};
-  supine_kriging_place *seen = supine_arena_take(&arena, n, sizeof *seen);
-  double *factor = supine_arena_take(&arena, n * n, sizeof *factor);
+  supine_kriging_point *seen = supine_arena_take(&arena, n, sizeof *seen);
+  double *space = supine_arena_take(&arena, supine_kriging_space(n), sizeof *space);
   double *scratch = supine_arena_take(&arena, n, sizeof *scratch);
+  supine_kriging fit;
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu landmarks", n));
   for (size_t i = 0; i < n; ++i) {
     const supine_patient_landmark *landmark = &patient->landmark[i];
-    memcpy(seen[i].position, landmark->offset, sizeof seen[i].position);
-    seen[i].lung = landmark->side > 0 ? 0 : 1;
+    seen[i] = supine_kriging_landmark(landmark->offset, landmark->side > 0 ? 0 : 1);
   }
-  const bool positive = supine_kriging_share_prepare(n, seen, factor);
-  SUPINE_REFUSE_IF(!positive, error, SUPINE_ERROR_NUMERICAL,
-                   "the landmarks have no covariance: give finite positions");
+  SUPINE_TRY(supine_kriging_fit_landmarks(n, seen, space, &fit, error));
   for (size_t i = 0; i < count; ++i) {
-    supine_kriging_place at = {.lung = sides[i] > 0 ? 0 : 1};
-    memcpy(at.position, offsets + 3 * i, sizeof at.position);
-    shares[i] = supine_kriging_share(n, seen, factor, &at, scratch);
+    const supine_kriging_point at = supine_kriging_landmark(offsets + 3 * i, sides[i] > 0 ? 0 : 1);
+    shares[i] = supine_kriging_share(&fit, &at, scratch);
   }
   return SUPINE_OK;
 }

@@ -281,25 +281,39 @@ static supine_status read_rows(const char *basis, batch *b, supine_error *error)
 
 /* Check the output file and the options of a single state. */
 static supine_status check_samples(const request *wanted, supine_error *error) {
-  const char *path = wanted->content.path;
-  const bool holds = path != NULL && supine_text_ends_in(path, ".safetensors");
-  SUPINE_REFUSE_IF(wanted->samples_given && !holds, error, SUPINE_ERROR_ARGUMENT,
-                   "--samples needs -o FILE.safetensors: give it");
-  SUPINE_REFUSE_IF(!wanted->samples_given && holds, error, SUPINE_ERROR_ARGUMENT,
-                   "%s: such files hold samples: give --samples N", path);
+  SUPINE_TRY(
+      supine_command_deform_samples_check(wanted->content.path, wanted->samples_given, error));
   return wanted->samples_given ? SUPINE_OK
                                : supine_command_deform_content_check(&wanted->content, error);
 }
 
 /* Write samples of a state. */
 static supine_status draw(const supine_basis *basis, const request *wanted, supine_error *error) {
-  const supine_deform_samples samples = {
-      .path = wanted->content.path, .count = wanted->samples, .seed = wanted->seed};
   supine_state state = wanted->volume.state;
+  const supine_deform_samples samples = {.path = wanted->content.path,
+                                         .count = wanted->samples,
+                                         .seed = wanted->seed,
+                                         .basis = basis,
+                                         .state = &state};
+  const size_t n = supine_basis_get_info(basis)->vertex_count;
+  double distance = 0.0;
+  bool held = false;
+  char text[160];
   supine_pose pose;
   SUPINE_TRY(supine_options_pose(basis, name, &state, &pose, error));
   supine_options_tell_state(name, basis, &state, &pose);
-  return supine_command_deform_samples(&samples, basis, &state, error);
+  SUPINE_TRY(supine_command_deform_samples(&samples, &distance, &held, error));
+  (void)supine_state_describe(&state, text, sizeof text);
+  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I, s:s, s:I, s:f}", "file",
+                              supine_options_json_text(samples.path), "samples",
+                              (json_int_t)samples.count, "points", (json_int_t)n, "state", text,
+                              "seed", (json_int_t)samples.seed, "distance_rms_mm", distance));
+  supine_options_line("%s: %zu sample%s of %zu point%s, %s, seed %zu: %.1f mm (RMS) from the "
+                      "prediction%s\n",
+                      samples.path, samples.count, samples.count == 1 ? "" : "s", n,
+                      n == 1 ? "" : "s", text, samples.seed, distance,
+                      held ? ", each with the volumes of the state" : "");
+  return SUPINE_OK;
 }
 
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {

@@ -7,8 +7,8 @@
 #include <supine/safetensors.h>
 
 #include "base/arena.h"
-
 #include "base/number.h"
+#include "base/text.h"
 #include "program/command/deform_samples.h"
 #include "program/options/command.h"
 #include "program/options/inside.h"
@@ -17,6 +17,7 @@
 typedef struct source {
   const supine_basis *basis;
   const supine_state *state;
+  const supine_location *location;
   const supine_doubt *field;
   const supine_doubt_mend *mend;
   size_t seed, vertices;
@@ -34,16 +35,23 @@ static void end(source *s) {
 
 /* Prepare the members that `basis`, `state` and `seed` decide. */
 static supine_status begin(source *s, supine_error *error) {
-  const supine_doubt_task task = {.basis = s->basis, .state_count = 1, .states = s->state};
+  const supine_doubt_task task = {
+      .basis = s->basis, .state_count = 1, .states = s->state, .location = s->location};
   const size_t more = supine_doubt_mend_space(s->basis);
-  double *space = supine_arena_take(&s->arena, supine_doubt_space(1), sizeof *space);
+  double *space = supine_arena_take(&s->arena, supine_doubt_space(s->basis, 1), sizeof *space);
   double *mend = supine_arena_take(&s->arena, more, sizeof *mend);
   supine_pose pose;
   s->vertices = supine_basis_get_info(s->basis)->vertex_count;
   s->predicted = supine_arena_take(&s->arena, 3 * s->vertices, sizeof *s->predicted);
   SUPINE_TRY(supine_arena_check(&s->arena, error, "samples of %zu vertices", s->vertices));
-  SUPINE_TRY(supine_basis_pose(s->basis, s->state, &pose, error));
-  (void)supine_deform(s->basis, &pose, s->predicted);
+  if (s->location != NULL) {
+    float *sigma = supine_arena_take(&s->arena, s->vertices, sizeof *sigma);
+    SUPINE_TRY(supine_arena_check(&s->arena, error, "%zu vertices", s->vertices));
+    SUPINE_TRY(supine_locate_positions(s->location, s->basis, s->predicted, sigma, error));
+  } else {
+    SUPINE_TRY(supine_basis_pose(s->basis, s->state, &pose, error));
+    (void)supine_deform(s->basis, &pose, s->predicted);
+  }
   SUPINE_TRY(supine_doubt_prepare(&task, space, &s->field, error));
   return supine_doubt_mend_prepare(s->field, 0, mend, &s->mend, error);
 }
@@ -65,6 +73,13 @@ supine_status supine_command_deform_sample(const supine_basis *basis, const supi
   return SUPINE_OK;
 }
 
+/* Return whether samples have the volumes of the state. Located lungs whose volume the points
+ * decide differ in it. */
+static bool holds_volumes(const source *s) {
+  return s->mend != NULL &&
+         (s->location == NULL || !(supine_location_get_info(s->location)->volume_error > 0.0));
+}
+
 /* Sort vertices [vertices, 3] from the order of the basis into that of the file. */
 static void sort(const source *s, const float *xyz, float *sorted) {
   for (size_t i = 0; i < s->vertices; ++i) {
@@ -74,7 +89,7 @@ static void sort(const source *s, const float *xyz, float *sorted) {
 }
 
 /* Write samples, with the triangles and names of their vertices. */
-static supine_status save(const supine_deform_samples *wanted, const source *s, const char *state,
+static supine_status save(const supine_deform_samples *wanted, const source *s,
                           const float *positions, supine_error *error) {
   const size_t n = s->vertices;
   SUPINE_ARENA arena = {0};
@@ -85,6 +100,7 @@ static supine_status save(const supine_deform_samples *wanted, const source *s, 
   static const char *const copied[] = {"triangles", "names", "part"};
   size_t count = 2;
   char seed[24];
+  char state[160];
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   sort(s, s->predicted, predicted);
   for (size_t i = 0; i < sizeof copied / sizeof *copied; ++i) {
@@ -100,6 +116,7 @@ static supine_status save(const supine_deform_samples *wanted, const source *s, 
     tensors[count - 1].data = part;
   }
   (void)snprintf(seed, sizeof seed, "%zu", s->seed);
+  (void)supine_state_describe(s->state, state, sizeof state);
   const supine_metadata metadata[] = {
       {"format", "supine-samples"},
       {"version", "1"},
@@ -107,21 +124,34 @@ static supine_status save(const supine_deform_samples *wanted, const source *s, 
       {"axes", "LPS"},
       {"state", state},
       {"seed", seed},
-      {"volume", s->mend != NULL ? "that of the state in every sample" : "not exact"}};
+      {"frame", s->location != NULL ? "of the observations" : "of the scan"},
+      {"volume", holds_volumes(s) ? "that of the state in every sample" : "not exact"}};
   return supine_safetensors_write(wanted->path, tensors, count, metadata,
                                   sizeof metadata / sizeof *metadata, error);
 }
 
-supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
-                                            const supine_basis *basis, const supine_state *state,
-                                            supine_error *error) {
-  SUPINE_FREED_BY(end) source s = {.basis = basis, .state = state, .seed = wanted->seed};
-  char text[160];
+supine_status supine_command_deform_samples_check(const char *path, bool given,
+                                                  supine_error *error) {
+  const bool holds = path != NULL && supine_text_ends_in(path, ".safetensors");
+  SUPINE_REFUSE_IF(given && !holds, error, SUPINE_ERROR_ARGUMENT,
+                   "--samples needs -o FILE.safetensors: give it");
+  SUPINE_REFUSE_IF(!given && holds, error, SUPINE_ERROR_ARGUMENT,
+                   "%s: such files hold samples: give --samples N", path);
+  return SUPINE_OK;
+}
+
+supine_status supine_command_deform_samples(const supine_deform_samples *wanted, double *distance,
+                                            bool *held, supine_error *error) {
+  SUPINE_FREED_BY(end)
+  source s = {.basis = wanted->basis,
+              .state = wanted->state,
+              .location = wanted->location,
+              .seed = wanted->seed};
   double square = 0.0;
   SUPINE_TRY(begin(&s, error));
-  const char *content = supine_basis_metadata(basis, "content");
+  const char *content = supine_basis_metadata(s.basis, "content");
   if (content != NULL && strcmp(content, "points") == 0) {
-    SUPINE_TRY(supine_options_names_open(basis, &s.names, error));
+    SUPINE_TRY(supine_options_names_open(s.basis, &s.names, error));
   }
   const size_t each = 3 * s.vertices;
   float *xyz = supine_arena_take(&s.arena, each, sizeof *xyz);
@@ -142,17 +172,7 @@ supine_status supine_command_deform_samples(const supine_deform_samples *wanted,
         supine_options_progress_step(&progress, (double)(i + 1) / (double)wanted->count);
     SUPINE_REFUSE_IF(!goes_on, error, SUPINE_ERROR_INTERRUPTED, "interrupted: nothing was written");
   }
-  (void)supine_state_describe(state, text, sizeof text);
-  SUPINE_TRY(save(wanted, &s, text, positions, error));
-  const double distance = sqrt(square / (double)(s.vertices * wanted->count));
-  SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I, s:s, s:I, s:f}", "file",
-                              supine_options_json_text(wanted->path), "samples",
-                              (json_int_t)wanted->count, "points", (json_int_t)s.vertices, "state",
-                              text, "seed", (json_int_t)wanted->seed, "distance_rms_mm", distance));
-  supine_options_line("%s: %zu sample%s of %zu point%s, %s, seed %zu: %.1f mm (RMS) from the "
-                      "prediction%s\n",
-                      wanted->path, wanted->count, wanted->count == 1 ? "" : "s", s.vertices,
-                      s.vertices == 1 ? "" : "s", text, wanted->seed, distance,
-                      s.mend != NULL ? ", each with the volumes of the state" : "");
-  return SUPINE_OK;
+  *distance = sqrt(square / (double)(s.vertices * wanted->count));
+  *held = holds_volumes(&s);
+  return save(wanted, &s, positions, error);
 }

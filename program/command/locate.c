@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "mesh/io/points.h"
 #include "precompute/posed/located.h"
+#include "program/command/deform_samples.h"
 #include "program/command/list.h"
 #include "program/options/basis_input.h"
 #include "program/options/facts.h"
@@ -26,7 +27,9 @@ typedef struct request {
   supine_orientation orientation;
   supine_state state; /* the volume is fitted if its kind is SUPINE_VOLUME_DEFAULT */
   double noise, depth;
-  bool rigid;
+  bool rigid, surface;
+  size_t samples, seed;
+  bool samples_given;
   supine_mesh_load_options load;
 } request;
 
@@ -36,9 +39,23 @@ static const supine_option table[] = {
     {"output", 'o', "FILE",
      ".vtp or .ply: the surface of the lungs; .csv, or " SUPINE_MARKUPS_ENDING
      " of 3D Slicer: all structures in the file of --points. "
-     "Positions are in the frame of the observations, and each has its expected error",
+     "Positions are in the frame of the observations, and each has its expected error. Samples are "
+     ".safetensors",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
-     .endings = ".vtp, .ply, .csv or " SUPINE_MARKUPS_ENDING},
+     .endings = ".vtp, .ply, .csv, .safetensors or " SUPINE_MARKUPS_ENDING},
+    {"samples", 0, "N",
+     "write N plausible places of all structures in the file of --points to -o FILE.safetensors, "
+     "as "
+     "'supine deform --samples' does. They pass near the observed points, within their noise, and "
+     "are uncertain far from them",
+     SUPINE_FILLS(request, samples), SUPINE_SAYS_GIVEN(request, samples_given),
+     .range = {1.0, 100000.0}},
+    {"surface", 0, NULL,
+     "samples of the surface of the lungs, in place of the structures. Each has the volume of "
+     "--volume",
+     SUPINE_FILLS(request, surface)},
+    {"seed", 0, "S", "number that decides the samples: another one draws other lungs",
+     SUPINE_FILLS(request, seed), .standard = "0"},
     {"volume", 0, "VOLUME", SUPINE_VOLUME_HELP ". By default, it is fitted to the points",
      SUPINE_FILLS(request, state), .read = supine_options_read_volume},
     {"rigid", 0, NULL,
@@ -168,11 +185,13 @@ static void print(const request *wanted, const supine_options_names *names,
   char text[160];
   (void)supine_state_describe(&posture, text, sizeof text);
   supine_options_print(json_pack(
-      "{s:o, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:o*, "
+      "{s:o, s:o*, s:I, s:f, s:f, s:s, s:o*, s:o*, s:f, s:o*, s:o*, s:[f, f, f], s:o*, s:o*, "
       "s:I, s:o*, s:f, s:o}",
-      "file", supine_options_json_text(wanted->output), "points", (json_int_t)n, "expected_rms_mm",
-      located->expected_rms, "expected_largest_mm", located->expected_largest, "posture", text,
-      "probability_percent", given ? NULL : json_real(100.0 * share), "determined",
+      "file", supine_options_json_text(wanted->output), "samples",
+      wanted->samples_given ? json_integer((json_int_t)wanted->samples) : NULL, "points",
+      (json_int_t)n, "expected_rms_mm", located->expected_rms, "expected_largest_mm",
+      located->expected_largest, "posture", text, "probability_percent",
+      given ? NULL : json_real(100.0 * share), "determined",
       given ? NULL : json_boolean(share >= determined), "volume_ml", volume, "volume_deviation_ml",
       fitted ? json_real(best->volume_error) : NULL, "deviation_without_points_ml",
       fitted ? json_real(best->volume_prior_error) : NULL, "translation_mm", t[0], t[1], t[2],
@@ -260,16 +279,47 @@ static supine_status finish_surface(const request *wanted, const supine_basis *l
   return supine_mesh_save(wanted->output, &mesh, &save, error);
 }
 
+/* Print the report, and write samples of the located lungs or structures. */
+static supine_status finish_samples(const request *wanted, const supine_basis *shown,
+                                    const supine_options_names *names, const observations *observed,
+                                    const supine_posed_located *located, supine_error *error) {
+  const supine_deform_samples samples = {.path = wanted->output,
+                                         .count = wanted->samples,
+                                         .seed = wanted->seed,
+                                         .basis = shown,
+                                         .state = &located->best->state,
+                                         .location = located->location[0]};
+  double distance = 0.0;
+  bool held = false;
+  print(wanted, names, observed, supine_basis_get_info(shown)->vertex_count, located->best->volume,
+        located);
+  return supine_command_deform_samples(&samples, &distance, &held, error);
+}
+
+static supine_status check_samples(const request *wanted, supine_error *error) {
+  SUPINE_TRY(supine_command_deform_samples_check(wanted->output, wanted->samples_given, error));
+  SUPINE_REFUSE_IF(wanted->surface && !wanted->samples_given, error, SUPINE_ERROR_ARGUMENT,
+                   "--surface is one of samples: give --samples N, or -o FILE.vtp for the located "
+                   "surface");
+  SUPINE_REFUSE_IF(wanted->samples_given && !wanted->orientation.given, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "samples are of one posture, which a few points seldom determine: give "
+                   "--posture NAME");
+  return SUPINE_OK;
+}
+
 static supine_status run(void *chosen, const supine_arguments *given, supine_error *error) {
   enum { OUTLIER_POINTS = 5 }; /* supine_locate leaves out at most a fifth of the points */
   request *wanted = chosen;
-  const bool points =
-      supine_text_ends_in(wanted->output, ".csv") || supine_options_markups_named(wanted->output);
+  const bool points = wanted->samples_given ? !wanted->surface
+                                            : supine_text_ends_in(wanted->output, ".csv") ||
+                                                  supine_options_markups_named(wanted->output);
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *lungs = NULL;
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *inside = NULL;
   SUPINE_FREED_BY(supine_options_names_close) supine_options_names names = {0};
   SUPINE_FREED_BY(supine_posed_located_free) supine_posed_located located = {0};
   observations observed = {0};
+  SUPINE_TRY(check_samples(wanted, error));
   if (wanted->orientation.given) {
     SUPINE_TRY(supine_options_state(&wanted->orientation, &wanted->state, error));
   }
@@ -293,6 +343,9 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (count_points(&observed) < OUTLIER_POINTS) {
     supine_options_note(name, "with fewer than %d points, a wrong one cannot be found: check them",
                         (int)OUTLIER_POINTS);
+  }
+  if (wanted->samples_given) {
+    return finish_samples(wanted, points ? inside : lungs, &names, &observed, &located, error);
   }
   return points ? finish_points(wanted, inside, &names, &observed, &located, error)
                 : finish_surface(wanted, lungs, &names, &observed, &located, error);
@@ -327,7 +380,9 @@ const supine_command supine_command_locate = {
              "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
              "supine -o found.vtp\n"
              "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
-             "left --volume rest --rigid -o found.csv",
+             "left --volume rest --rigid -o found.csv\n"
+             "  supine locate lungs.safetensors observed.csv --points inside.safetensors --posture "
+             "supine --samples 100 -o drawn.safetensors",
     .operands_least = 2,
     .operands_most = 2,
     .operands_missing = "name a basis file and a file of observed points",

@@ -65,8 +65,8 @@ static supine_status find_vertices(const char *path, const supine_basis *basis,
 static supine_status fit(const supine_doubt_task *task, size_t count, const size_t *vertices,
                          supine_motion *motion, float *sigma, supine_error *error) {
   SUPINE_ARENA arena = {0};
-  double *space = supine_arena_take(&arena, supine_doubt_space(1), sizeof *space);
-  double *more = supine_arena_take(&arena, supine_doubt_frame_space(count), sizeof *more);
+  double *space = supine_arena_take(&arena, supine_doubt_space(task->basis, 1), sizeof *space);
+  double *more = supine_arena_take(&arena, supine_doubt_frame_space(task->basis, count), sizeof *more);
   const supine_doubt *doubt = NULL;
   const supine_doubt_frame *frame = NULL;
   SUPINE_TRY(supine_arena_check(&arena, error, "%zu points", count));

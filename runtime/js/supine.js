@@ -367,7 +367,8 @@ class Basis {
   #reserveDoubt() {
     const { supine_doubt_space: field, supine_doubt_frame_space: frame, supine_doubt_mend_space: mend } = this.#c;
     const each = 3 * TOGETHER;
-    const sizes = [TASK / 8, field(1), frame(FIDUCIALS), mend(this.#basis), FIDUCIALS, each + each * each];
+    const of = this.#basis;
+    const sizes = [TASK / 8, field(of, 1), frame(of, FIDUCIALS), mend(of), FIDUCIALS, each + each * each];
     const at = sizes.map((size) => this.#allocate(8 * size));
     this.#doubt = { task: at[0], field: at[1], frame: at[2], mend: at[3], list: at[4], numbers: at[5] };
   }
@@ -379,7 +380,7 @@ class Basis {
     const from = this.#poseSince(since);
     this.#drawn = undefined; // the field is in the same memory
     const { task, field } = this.#doubt;
-    this.#view(Uint32Array, task, 5).set([this.#basis, 1, this.#state, from, anotherDay ? 1 : 0]);
+    this.#view(Uint32Array, task, 6).set([this.#basis, 1, this.#state, from, anotherDay ? 1 : 0, 0]);
     this.#check(this.#c.supine_doubt_prepare(task, field, this.#text, this.#error));
     return this.#word(this.#text);
   }

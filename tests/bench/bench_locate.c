@@ -269,7 +269,7 @@ static void clock_samples(const supine_basis *basis, const supine_state *state, 
   static const char *const names[] = {"positions", "expected errors", "preparing samples",
                                       "a sample", "mending it"};
   const supine_doubt_task task = {.basis = basis, .state_count = 1, .states = state};
-  double *space = malloc(supine_doubt_space(1) * sizeof *space);
+  double *space = malloc(supine_doubt_space(basis, 1) * sizeof *space);
   double *more = malloc(supine_doubt_mend_space(basis) * sizeof *more);
   double least[5] = {INFINITY, INFINITY, INFINITY, INFINITY, INFINITY};
   supine_error error;

@@ -386,6 +386,10 @@ static void add_volumes(const fixture *f, tensors *t) {
   if (f->error_share != NULL) {
     add_tensor(t, (supine_tensor){"error_share", SUPINE_F32, 1, {f->vertices}, f->error_share});
   }
+  if (f->landmarks != NULL) {
+    add_tensor(t,
+               (supine_tensor){"landmarks", SUPINE_F32, 2, {f->landmark_count, 4}, f->landmarks});
+  }
   if (f->vertex_error != NULL) {
     add_tensor(t, (supine_tensor){"error_vertices", SUPINE_F32, 1, {f->vertices}, f->vertex_error});
   }
@@ -423,7 +427,7 @@ void fixture_write(const fixture *f, const char *path) {
     add_normals(f, &t);
   }
   (void)snprintf(total, sizeof total, "%.17g,%.17g", f->total[0], f->total[1]);
-  supine_metadata metadata[8] = {
+  supine_metadata metadata[9] = {
       {"format", "supine-basis"},
       {"version", "4"},
       {"kind", f->vector ? "vector" : "scalar"},
@@ -439,6 +443,9 @@ void fixture_write(const fixture *f, const char *path) {
   }
   if (f->scan_gravity != NULL) {
     metadata[metadata_count++] = (supine_metadata){"scan_gravity", f->scan_gravity};
+  }
+  if (f->landmarks != NULL) {
+    metadata[metadata_count++] = (supine_metadata){"expected_error_share", "0.5"};
   }
   supine_error error = {0};
   const supine_status status =

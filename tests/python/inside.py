@@ -238,6 +238,12 @@ observed = truth[seen] + np.array([12, -7, 20])
 observed[7, 2] += 60
 found = lungs.locate(seen, observed, "left", "rest+300")
 assert list(np.flatnonzero(found.outliers)) == [7] and found.volume_error == 0
+# The field of located lungs is that which `positions` states, and samples have the volume that was given.
+mean, covariance = found.covariance(lungs, seen[:3])
+assert np.abs(mean - found.positions(lungs)[0][seen[:3]]).max() < 1e-3
+assert np.abs(np.sqrt(np.einsum("ikik->i", covariance)) - found.positions(lungs)[1][seen[:3]]).max() < 1e-3
+drawn = found.samples(lungs, 2, seed=3)
+assert drawn.shape == (2, n, 3) and (drawn[1] != drawn[0]).any()
 assert (found.positions(lungs)[1] <= np.maximum(3.01, 1.001 * lungs.expected_error("left", "rest+300"))).all()
 assert (lungs.expected_error("scan") == 0).all()
 # Two views, rows of one vertex, show where the points are; one view leaves the depth to its prior.

@@ -50,7 +50,7 @@ static int setup(void **state) {
   for (size_t i = 0; i < POINTS; ++i) {
     w->points[i] = (supine_doubt_point){i % PER_STATE * 6 + 4, i / PER_STATE};
   }
-  w->space = fixture_allocate(supine_doubt_space(STATES), sizeof *w->space);
+  w->space = fixture_allocate(supine_doubt_space(w->basis, STATES), sizeof *w->space);
   w->doubt = prepare(w, false, w->space);
   assert_int_equal(
       supine_doubt_covariance(w->doubt, POINTS, w->points, w->mean, w->covariance, NULL),
@@ -188,7 +188,7 @@ TEST(test_covariance_several_states_positive) {
 TEST(test_covariance_another_day_adds_its_kernel) {
   world *w = *state;
   static double other[SIZE * SIZE];
-  double *space = fixture_allocate(supine_doubt_space(STATES), sizeof *space);
+  double *space = fixture_allocate(supine_doubt_space(w->basis, STATES), sizeof *space);
   const supine_doubt *doubt = prepare(w, true, space);
   assert_int_equal(supine_doubt_covariance(doubt, POINTS, w->points, NULL, other, NULL), SUPINE_OK);
   assert_close(other[0] - w->covariance[0], 4.0 / 9 * 6.2 * 6.2, 1e-9);
@@ -237,7 +237,7 @@ TEST(test_frame_errors_equal_those_of_registered_samples) {
   float xyz[3 * VERTICES];
   double predicted[3 * VERTICES];
   double seen[VERTICES] = {0};
-  assert_true(supine_doubt_frame_space(FIDUCIALS) <= 2000);
+  assert_true(supine_doubt_frame_space(w->basis, FIDUCIALS) <= 2000);
   assert_int_equal(supine_doubt_frame_prepare(w->doubt, FIDUCIALS, at, space, &frame, NULL),
                    SUPINE_OK);
   assert_int_equal(supine_doubt_frame_errors(frame, 0, VERTICES, sigma), SUPINE_OK);
@@ -294,44 +294,57 @@ TEST(test_frame_errors_equal_those_of_registered_samples) {
   assert_true(rotation[0] > 0.9 && rotation[4] > 0.9 && rotation[8] > 0.9);
 }
 
-/* Of 1000 samples, each variance is within 15 % of the formula, and the covariances within 5 % RMS
- * of the variance. Seed and index decide a sample. */
-TEST(test_sample_thousand_have_the_covariance) {
-  enum { SAMPLES = 1000 };
-  world *w = *state;
+/* Assert that of many samples, each variance is within 15 % of the formula, and the covariances
+ * within 5 % RMS of the variance.
+ * @param count  of points, at most POINTS, ordered by their states */
+static void check_samples(const supine_doubt *doubt, size_t samples, size_t count,
+                          const supine_doubt_point *points, const char *what) {
+  static double covariance[SIZE * SIZE];
   static double found[SIZE * SIZE];
+  const size_t size = 3 * count;
+  double mean[SIZE];
   double deviation[SIZE];
   float xyz[3 * VERTICES];
-  float again[3 * VERTICES];
+  assert_int_equal(supine_doubt_covariance(doubt, count, points, mean, covariance, NULL),
+                   SUPINE_OK);
   memset(found, 0, sizeof found);
-  for (size_t s = 0; s < SAMPLES; ++s) {
-    for (size_t i = 0; i < POINTS; ++i) {
-      if (i % PER_STATE == 0) {
-        assert_int_equal(supine_doubt_sample(w->doubt, w->points[i].state, 5, s, xyz, NULL),
-                         SUPINE_OK);
+  for (size_t s = 0; s < samples; ++s) {
+    for (size_t i = 0; i < count; ++i) {
+      if (i == 0 || points[i].state != points[i - 1].state) {
+        assert_int_equal(supine_doubt_sample(doubt, points[i].state, 5, s, xyz, NULL), SUPINE_OK);
       }
       for (size_t k = 0; k < 3; ++k) {
-        deviation[3 * i + k] = (double)xyz[3 * w->points[i].vertex + k] - w->mean[3 * i + k];
+        deviation[3 * i + k] = (double)xyz[3 * points[i].vertex + k] - mean[3 * i + k];
       }
     }
-    for (size_t e = 0; e < (size_t)SIZE * SIZE; ++e) {
-      found[e] += deviation[e / SIZE] * deviation[e % SIZE] / SAMPLES;
+    for (size_t e = 0; e < size * size; ++e) {
+      found[e] += deviation[e / size] * deviation[e % size] / (double)samples;
     }
   }
   double sum = 0;
-  for (size_t e = 0; e < (size_t)SIZE * SIZE; ++e) {
-    const size_t i = e / SIZE;
-    const size_t j = e % SIZE;
-    const double scale = sqrt(w->covariance[i * SIZE + i] * w->covariance[j * SIZE + j]);
-    sum += pow((found[e] - w->covariance[e]) / scale, 2) / (SIZE * SIZE);
+  for (size_t e = 0; e < size * size; ++e) {
+    const size_t i = e / size;
+    const size_t j = e % size;
+    const double scale = sqrt(covariance[i * size + i] * covariance[j * size + j]);
+    sum += pow((found[e] - covariance[e]) / scale, 2) / (double)(size * size);
     assert_true(i != j || fabs(found[e] / scale - 1) < 0.15);
   }
-  print_message("covariances of samples differ by %.3f of the variance (RMS)\n", sqrt(sum));
+  print_message("%s: covariances of samples differ by %.3f of the variance (RMS)\n", what,
+                sqrt(sum));
   assert_true(sqrt(sum) < 0.05);
-  assert_int_equal(supine_doubt_sample(w->doubt, 3, 5, SAMPLES - 1, again, NULL), SUPINE_OK);
-  assert_memory_equal(again, xyz, sizeof again);
-  assert_int_equal(supine_doubt_sample(w->doubt, 3, 6, SAMPLES - 1, again, NULL), SUPINE_OK);
-  assert_memory_not_equal(again, xyz, sizeof again);
+}
+
+/* Seed and index decide a sample. */
+TEST(test_sample_thousand_have_the_covariance) {
+  const world *w = *state;
+  float xyz[2][3 * VERTICES];
+  check_samples(w->doubt, 1000, POINTS, w->points, "four states");
+  for (size_t i = 0; i < 2; ++i) {
+    assert_int_equal(supine_doubt_sample(w->doubt, 3, 5, 17, xyz[i], NULL), SUPINE_OK);
+  }
+  assert_memory_equal(xyz[0], xyz[1], sizeof xyz[0]);
+  assert_int_equal(supine_doubt_sample(w->doubt, 3, 6, 17, xyz[1], NULL), SUPINE_OK);
+  assert_memory_not_equal(xyz[0], xyz[1], sizeof xyz[0]);
 }
 
 /* Compute the volume of a lung, mm^3, and its change with every coordinate, mm^2. */
@@ -407,54 +420,206 @@ static bool is_turned(const world *w, size_t triangle, const float *before, cons
   return !(product > 0);
 }
 
-/* Mended samples hold the predicted volumes, turn no triangle over, and have the errors that remain
- * if the volumes are known: each point's within 10 %. */
-TEST(test_mend_thousand_samples_hold_volumes_and_conditional_errors) {
+/* Assert that mended samples of a state hold the predicted volumes, turn no triangle over, and have
+ * the errors that remain if the volumes are known: each point's within 10 %. Add to `turned` the
+ * triangles that were turned over before. */
+static void check_mended(const world *w, size_t s, size_t *turned) {
   enum { SAMPLES = 1000 };
-  world *w = *state;
   double *space = fixture_allocate(supine_doubt_mend_space(w->basis), sizeof *space);
   double scratch[3 * VERTICES];
+  double square[VERTICES] = {0};
+  double variance[3 * VERTICES];
+  double volume[2];
   float predicted[3 * VERTICES];
   float xyz[3 * VERTICES];
-  size_t turned[2] = {0, 0};                        /* triangles, before and after mending */
-  for (size_t s = 0; s < STATES; s += STATES - 1) { /* an assumed and a given volume */
-    double square[VERTICES] = {0};
-    double variance[3 * VERTICES];
-    double volume[2];
-    const supine_doubt_mend *mend = NULL;
-    supine_pose pose;
-    assert_int_equal(supine_basis_pose(w->basis, &w->states[s], &pose, NULL), SUPINE_OK);
-    supine_deform(w->basis, &pose, predicted);
-    condition(w, s, predicted, variance);
-    assert_int_equal(supine_doubt_mend_prepare(w->doubt, s, space, &mend, NULL), SUPINE_OK);
+  const supine_doubt_mend *mend = NULL;
+  supine_pose pose;
+  assert_int_equal(supine_basis_pose(w->basis, &w->states[s], &pose, NULL), SUPINE_OK);
+  supine_deform(w->basis, &pose, predicted);
+  condition(w, s, predicted, variance);
+  assert_int_equal(supine_doubt_mend_prepare(w->doubt, s, space, &mend, NULL), SUPINE_OK);
+  for (size_t lung = 0; lung < 2; ++lung) {
+    volume[lung] = find_gradient(w, lung, predicted, scratch);
+  }
+  for (size_t i = 0; i < SAMPLES; ++i) {
+    assert_int_equal(supine_doubt_sample(w->doubt, s, 9, i, xyz, NULL), SUPINE_OK);
+    for (size_t t = 0; t < w->fixture->triangles; ++t) {
+      *turned += is_turned(w, t, predicted, xyz);
+    }
+    assert_int_equal(supine_doubt_mend_sample(mend, xyz, NULL), SUPINE_OK);
+    for (size_t t = 0; t < w->fixture->triangles; ++t) {
+      assert_false(is_turned(w, t, predicted, xyz));
+    }
     for (size_t lung = 0; lung < 2; ++lung) {
-      volume[lung] = find_gradient(w, lung, predicted, scratch);
+      assert_close(find_gradient(w, lung, xyz, scratch), volume[lung], 20);
     }
-    for (size_t i = 0; i < SAMPLES; ++i) {
-      assert_int_equal(supine_doubt_sample(w->doubt, s, 9, i, xyz, NULL), SUPINE_OK);
-      for (size_t t = 0; t < w->fixture->triangles; ++t) {
-        turned[0] += is_turned(w, t, predicted, xyz);
-      }
-      assert_int_equal(supine_doubt_mend_sample(mend, xyz, NULL), SUPINE_OK);
-      for (size_t t = 0; t < w->fixture->triangles; ++t) {
-        turned[1] += is_turned(w, t, predicted, xyz);
-      }
-      for (size_t lung = 0; lung < 2; ++lung) {
-        assert_close(find_gradient(w, lung, xyz, scratch), volume[lung], 20);
-      }
-      for (size_t e = 0; e < 3 * VERTICES; ++e) {
-        square[e / 3] += pow((double)xyz[e] - (double)predicted[e], 2) / SAMPLES;
-      }
-    }
-    for (size_t i = 0; i < VERTICES; ++i) {
-      const double expected = variance[3 * i] + variance[3 * i + 1] + variance[3 * i + 2];
-      const double ratio = sqrt(square[i] / expected);
-      assert_true(ratio > 0.9 && ratio < 1.1);
+    for (size_t e = 0; e < 3 * VERTICES; ++e) {
+      square[e / 3] += pow((double)xyz[e] - (double)predicted[e], 2) / SAMPLES;
     }
   }
-  print_message("%zu triangles were turned over, and %zu are\n", turned[0], turned[1]);
-  assert_true(turned[0] > 0 && turned[1] == 0);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    const double expected = variance[3 * i] + variance[3 * i + 1] + variance[3 * i + 2];
+    const double ratio = sqrt(square[i] / expected);
+    assert_true(ratio > 0.9 && ratio < 1.1);
+  }
   free(space);
+}
+
+TEST(test_mend_thousand_samples_hold_volumes_and_conditional_errors) {
+  const world *w = *state;
+  size_t turned = 0;
+  check_mended(w, 0, &turned); /* an assumed volume */
+  check_mended(w, STATES - 1, &turned);
+  assert_true(turned > 0);
+}
+
+/* After a fit of landmarks, covariances are those of kriging with them, and samples have these. */
+TEST(test_covariance_after_landmarks_is_that_of_kriging) {
+  enum { LANDMARKS = 7 };
+  world *w = *state;
+  world after = *w;
+  float landmarks[4 * LANDMARKS];
+  float share[VERTICES];
+  supine_kriging_point seen[LANDMARKS];
+  double scratch[LANDMARKS];
+  double white[2][LANDMARKS];
+  double pair[9];
+  supine_kriging fit;
+  double *kriging = fixture_allocate(supine_kriging_space(LANDMARKS), sizeof *kriging);
+  size_t size = 0;
+  size_t turned = 0;
+  for (size_t i = 0; i < LANDMARKS; ++i) {
+    const size_t vertex = i * 6 + 1;
+    const float *from = w->fixture->vertex + 3 * vertex;
+    const double place[3] = {(double)from[0] * 0.75, (double)from[1], (double)from[2] * 0.5};
+    for (size_t k = 0; k < 3; ++k) {
+      landmarks[4 * i + k] = (float)place[k];
+    }
+    landmarks[4 * i + 3] = (float)w->fixture->lung[vertex];
+    seen[i] = supine_kriging_landmark(place, w->fixture->lung[vertex]);
+  }
+  assert_int_equal(supine_kriging_fit_landmarks(LANDMARKS, seen, kriging, &fit, NULL), SUPINE_OK);
+  supine_kriging_point at[VERTICES];
+  for (size_t i = 0; i < VERTICES; ++i) {
+    const float *from = w->fixture->vertex + 3 * i;
+    const double place[3] = {(double)from[0], (double)from[1], (double)from[2]};
+    at[i] = supine_kriging_landmark(place, w->fixture->lung[i]);
+    share[i] = (float)(supine_kriging_share(&fit, &at[i], scratch) / 0.5);
+  }
+  w->fixture->error_share = share;
+  w->fixture->landmarks = landmarks;
+  w->fixture->landmark_count = LANDMARKS;
+  unsigned char *bytes = fixture_bytes(w->fixture, &size);
+  w->fixture->error_share = w->fixture->landmarks = NULL;
+  assert_int_equal(supine_basis_open_memory(bytes, size, &after.basis, NULL), SUPINE_OK);
+  after.space = fixture_allocate(supine_doubt_space(after.basis, STATES), sizeof *after.space);
+  after.doubt = prepare(&after, false, after.space);
+  assert_int_equal(
+      supine_doubt_covariance(after.doubt, POINTS, after.points, NULL, after.covariance, NULL),
+      SUPINE_OK);
+  const size_t first = SIZE / STATES * (STATES - 1); /* the displacement is the only term */
+  for (size_t i = 0; i < PER_STATE; ++i) {
+    for (size_t j = 0; j < PER_STATE; ++j) {
+      const supine_kriging_point *two[2] = {&at[w->points[i].vertex], &at[w->points[j].vertex]};
+      supine_kriging_whiten(&fit, two[0], white[0]);
+      supine_kriging_whiten(&fit, two[1], white[1]);
+      supine_kriging_covary(&fit, two[0], white[0], two[1], white[1], pair);
+      const double *variance = after.covariance + first * (SIZE + 1);
+      const double scale = variance[0] / (0.5 * (double)share[w->points[0].vertex]);
+      const double *block = variance + 3 * (i * SIZE + j);
+      assert_close(block[0], scale * pair[0], 1e-4 * scale);
+      assert_true(block[1] == 0 && pair[1] == 0);
+      assert_true(i != j || pair[0] < 0.95);
+    }
+  }
+  check_samples(after.doubt, 1000, POINTS, after.points, "after landmarks");
+  check_mended(&after, STATES - 1, &turned);
+  supine_basis_close(after.basis);
+  free(after.space);
+  free(kriging);
+  free(bytes);
+}
+
+typedef struct sighting {
+  const char *what;
+  size_t state; /* whose volume is given; the first one for one that is fitted */
+  bool fitted, rigid, line;
+} sighting;
+
+/* The field of located lungs has the positions and errors that locate states, samples have its
+ * covariance, and mended ones the volume that was given. */
+TEST(test_covariance_of_located_lungs_is_that_of_locate) {
+  enum { SEEN = 9 };
+  static const sighting cases[] = {{"volume given", 3, false, false, false},
+                                   {"volume fitted, frame turned", 0, true, true, false},
+                                   {"one view", 3, false, false, true}};
+  const world *w = *state;
+  for (size_t c = 0; c < sizeof cases / sizeof *cases; ++c) {
+    supine_observation seen[SEEN];
+    supine_locate_residual residuals[SEEN];
+    supine_doubt_point points[VERTICES];
+    double mean[3 * VERTICES];
+    static double covariance[9 * VERTICES * VERTICES];
+    float xyz[3 * VERTICES];
+    float sigma[VERTICES];
+    double scratch[3 * VERTICES];
+    supine_pose pose;
+    supine_error error;
+    const supine_location *found = NULL;
+    const supine_doubt *doubt = NULL;
+    const supine_doubt_mend *mend = NULL;
+    supine_state given = w->states[cases[c].state];
+    assert_int_equal(supine_basis_pose(w->basis, &given, &pose, NULL), SUPINE_OK);
+    supine_deform(w->basis, &pose, xyz);
+    for (size_t j = 0; j < SEEN; ++j) {
+      const size_t vertex = j * 4 + 2;
+      seen[j] = (supine_observation){.vertex = vertex, .noise = 1.5, .on_line = cases[c].line};
+      for (size_t k = 0; k < 3; ++k) {
+        const double x = (double)xyz[3 * vertex + k] + (double)((7 * j + 5 * k) % 9) - 4;
+        seen[j].from[k] = k == 1 ? -700 : 0;
+        seen[j].position[k] = cases[c].line ? seen[j].from[k] + 1.5 * (x - seen[j].from[k]) : x;
+      }
+    }
+    if (cases[c].fitted) {
+      given.volume.kind = SUPINE_VOLUME_DEFAULT;
+    }
+    const supine_locate_task task = {.inside = w->basis,
+                                     .count = SEEN,
+                                     .observed = seen,
+                                     .state = given,
+                                     .rigid = cases[c].rigid};
+    double *space[3] = {fixture_allocate(supine_locate_space(SEEN), sizeof **space),
+                        fixture_allocate(supine_doubt_space(w->basis, 1), sizeof **space),
+                        fixture_allocate(supine_doubt_mend_space(w->basis), sizeof **space)};
+    assert_int_equal(supine_locate(&task, residuals, space[0], &found, &error), SUPINE_OK);
+    assert_int_equal(supine_locate_positions(found, w->basis, xyz, sigma, NULL), SUPINE_OK);
+    const supine_doubt_task asked = {.basis = w->basis, .state_count = 1, .location = found};
+    assert_int_equal(supine_doubt_prepare(&asked, space[1], &doubt, &error), SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      points[i] = (supine_doubt_point){i, 0};
+    }
+    assert_int_equal(supine_doubt_covariance(doubt, VERTICES, points, mean, covariance, NULL),
+                     SUPINE_OK);
+    for (size_t i = 0; i < VERTICES; ++i) {
+      double trace = 0;
+      for (size_t k = 0; k < 3; ++k) {
+        trace += covariance[(3 * i + k) * (3 * VERTICES + 1)];
+        assert_close(mean[3 * i + k], (double)xyz[3 * i + k], 1e-4);
+      }
+      assert_close(sqrt(trace), (double)sigma[i], 1e-3 * (double)sigma[i]);
+    }
+    check_samples(doubt, 2000, POINTS, points + 5, cases[c].what);
+    assert_int_equal(supine_doubt_mend_prepare(doubt, 0, space[2], &mend, NULL), SUPINE_OK);
+    for (size_t i = 0; i < 20; ++i) {
+      assert_int_equal(supine_doubt_sample(doubt, 0, 3, i, xyz, NULL), SUPINE_OK);
+      assert_int_equal(supine_doubt_mend_sample(mend, xyz, NULL), SUPINE_OK);
+      const double volume = find_gradient(w, 0, xyz, scratch) + find_gradient(w, 1, xyz, scratch);
+      assert_true(cases[c].fitted || fabs(volume - 2e6) < 40);
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      free(space[i]);
+    }
+  }
 }
 
 TEST(test_doubt_wrong_input_refused) {

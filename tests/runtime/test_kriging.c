@@ -314,36 +314,47 @@ TEST(test_kriging_one_or_repeated_points_positive_definite) {
 /* Of one place with noise n, 1 / (1 + n) of the variance is known there, r^2 / (1 + n) where the
  * correlation is r, and nothing far away or, with r / 3, in the other lung. */
 TEST(test_kriging_share_one_place_equals_formula) {
-  const supine_kriging_place seen = {.position = {10, -20, 30}};
-  double factor = 0;
+  const double place[3] = {10, -20, 30};
+  const supine_kriging_point seen = supine_kriging_landmark(place, 0);
+  double *space = fixture_allocate(supine_kriging_space(1), sizeof *space);
   double scratch = 0;
-  assert_true(supine_kriging_share_prepare(1, &seen, &factor));
+  supine_kriging fit;
+  assert_int_equal(supine_kriging_fit_landmarks(1, &seen, space, &fit, NULL), SUPINE_OK);
   for (size_t lung = 0; lung < 2; ++lung) {
     for (int far = 0; far < 400; far += 45) {
-      const supine_kriging_place at = {.position = {10, -20 + far, 30}, .lung = lung};
+      const double there[3] = {10, -20 + far, 30};
+      const supine_kriging_point at = supine_kriging_landmark(there, lung);
       const double a = sqrt(3.0) * far / 90;
       const double r = (1 + a) * exp(-a) / (lung == 0 ? 1 : 3);
-      assert_close(supine_kriging_share(1, &seen, &factor, &at, &scratch), 1 - r * r / 1.1, 1e-12);
+      assert_close(supine_kriging_share(&fit, &at, &scratch), 1 - r * r / 1.1, 1e-12);
     }
   }
+  free(space);
+}
+
+static double share_of(size_t count, const supine_kriging_point *seen,
+                       const supine_kriging_point *at) {
+  double *space = fixture_allocate(supine_kriging_space(count), sizeof *space);
+  double scratch[2];
+  supine_kriging fit;
+  assert_int_equal(supine_kriging_fit_landmarks(count, seen, space, &fit, NULL), SUPINE_OK);
+  const double share = supine_kriging_share(&fit, at, scratch);
+  free(space);
+  return share;
 }
 
 /* A second place elsewhere lowers every share, and two at one place count as one with half the
  * noise. */
 TEST(test_kriging_share_more_places_leave_less) {
-  const supine_kriging_place seen[2] = {{.position = {0, 0, 0}}, {.position = {40, 0, 0}}};
-  const supine_kriging_place twice[2] = {seen[0], seen[0]};
-  const supine_kriging_place at = {.position = {15, 20, 0}};
-  double factor[4] = {0};
-  double scratch[2];
-  assert_true(supine_kriging_share_prepare(1, seen, factor));
-  const double one = supine_kriging_share(1, seen, factor, &at, scratch);
-  assert_true(supine_kriging_share_prepare(2, seen, factor));
-  const double two = supine_kriging_share(2, seen, factor, &at, scratch);
+  const double places[3][3] = {{0, 0, 0}, {40, 0, 0}, {15, 20, 0}};
+  const supine_kriging_point seen[2] = {supine_kriging_landmark(places[0], 0),
+                                        supine_kriging_landmark(places[1], 0)};
+  const supine_kriging_point twice[2] = {seen[0], seen[0]};
+  const supine_kriging_point at = supine_kriging_landmark(places[2], 0);
+  const double one = share_of(1, seen, &at);
+  const double two = share_of(2, seen, &at);
   assert_true(two > 0 && two < 0.9 * one && one < 1);
-  assert_true(supine_kriging_share_prepare(2, twice, factor));
-  const double same = supine_kriging_share(2, twice, factor, &seen[0], scratch);
-  assert_close(same, 0.05 / 1.05, 1e-12);
+  assert_close(share_of(2, twice, &seen[0]), 0.05 / 1.05, 1e-12);
 }
 
 TEST(test_kriging_rotation_of_collinear_points_refused) {

@@ -23,6 +23,17 @@
  *     h, l    12 mm
  * b_i Dg_xy and 3 mm Dg_x, vectors across the body and along x (supine/locate.h)
  *
+ * After a fit of landmarks, which the basis keeps, displacement has the covariance of simple
+ * kriging instead, which is small near them (unit variance before, noise of a tenth of it, k_L and
+ * K_LL the correlations with and among the landmarks, w the share of its variance that they leave
+ * at points that were held out):
+ *
+ *     4/9 sigma^2 C_st (k_ij - k_iL (K_LL + 1/10)^-1 k_Lj) / w
+ *
+ * sigma^2: mean of the term displacement. Located lungs (supine_locate) have the covariance of the
+ * kriging that found them, with the errors of translation, volume and rotation, times the factor of
+ * the residuals; its trace is the square of the error that supine_locate_positions states.
+ *
  * 4/9 is 4/3 over three axes: sigma was measured after the best translation had been taken out,
  * which leaves 3/4 of the variance. tests/FIGURES.md compares errors of distances and of
  * registrations, as stated and as landmarks of people with COPD show them. 6.2 mm: nine people, two
@@ -57,20 +68,27 @@ typedef struct supine_doubt_task {
   const supine_state *states; /**< [state_count] */
   const supine_state *from;   /**< state whose positions are exact; NULL for that of the scan */
   bool another_day;           /**< whether the lungs are those of another day than the scan */
+  /** Located lungs, in place of `states`, which is then not read and counts as one; NULL for
+   * states. Positions are in the frame of the observations. Keep it as long as the field is used.
+   */
+  const supine_location *location;
 } supine_doubt_task;
 
 /** The prepared field. It lies in the caller's memory, and may be used by any number of threads. */
 typedef struct supine_doubt supine_doubt;
 
 /** Return the number of doubles of work space that a field needs. */
-SUPINE_API size_t supine_doubt_space(size_t state_count);
+SUPINE_API size_t supine_doubt_space(const supine_basis *basis, size_t state_count);
 
 /** Prepare the field of a basis in its states. No other function allocates or needs more space.
- * Cost: n (n + 1) / 2 evaluations of the expected error for n states.
- * @param space  [supine_doubt_space(state_count)]; keep it as long as the field is used
+ * Cost: n (n + 1) / 2 evaluations of the expected error for n states, and the factor of a matrix
+ * of the landmarks.
+ * @param space  [supine_doubt_space(task->basis, task->state_count)]; keep it as long as the field
+ * is used
  * @param doubt  written; NULL after a failure
  * @return a status of supine_expected_error, or one of these:
- * @retval SUPINE_ERROR_ARGUMENT  the number of states is out of range */
+ * @retval SUPINE_ERROR_ARGUMENT  the number of states is out of range, or located lungs are to have
+ * several states, another state to count from, or another day */
 SUPINE_API supine_status supine_doubt_prepare(const supine_doubt_task *task, double *space,
                                               const supine_doubt **doubt, supine_error *error);
 
@@ -92,7 +110,7 @@ SUPINE_API supine_status supine_doubt_covariance(const supine_doubt *doubt, size
 typedef struct supine_doubt_frame supine_doubt_frame;
 
 /** Return the number of doubles of work space that a registration at `count` fiducials needs. */
-SUPINE_API size_t supine_doubt_frame_space(size_t count);
+SUPINE_API size_t supine_doubt_frame_space(const supine_basis *basis, size_t count);
 
 /** Register state 0 of a field at fiducials: find the rigid motion that moves their predicted
  * positions closest to their positions in the scan. After it, the error of a target t is
@@ -102,10 +120,11 @@ SUPINE_API size_t supine_doubt_frame_space(size_t count);
  * with the errors e_f of the fiducials: to first order, what a navigation system has left that was
  * registered there (the target registration error).
  * @param vertices  [count] fiducials, vertices of the basis
- * @param space     [supine_doubt_frame_space(count)]; keep it as long as `frame` is used
+ * @param space     [supine_doubt_frame_space(basis, count)]; keep it as long as `frame` is used
  * @retval SUPINE_ERROR_ARGUMENT  there are fewer than three or too many fiducials, a vertex is out
  * of range, or they lie too nearly on one line (their RMS distance from it is below 10 mm): the
- * rotation about it is then open */
+ * rotation about it is then open
+ * @retval SUPINE_ERROR_UNSUPPORTED  the lungs are located: they have the observations' frame */
 SUPINE_API supine_status supine_doubt_frame_prepare(const supine_doubt *doubt, size_t count,
                                                     const size_t *vertices, double *space,
                                                     const supine_doubt_frame **frame,
@@ -124,8 +143,11 @@ SUPINE_API supine_status supine_doubt_frame_errors(const supine_doubt_frame *fra
 
 /** Draw random lungs: the predicted positions of all vertices in state `state`, plus an error drawn
  * from the field. Samples of equal seed and index are equal in all states of the field, as far as
- * the states' errors are. Cost: 64 sines and cosines for each vertex and state of the field. The
- * volumes are not exact, and some triangles are turned over: supine_doubt_mend_sample.
+ * the states' errors are. They pass near what was observed, as Matheron's rule conditions a random
+ * field: what the observed points would predict of it is subtracted from it, and noise is drawn for
+ * them. Cost: 64 sines and cosines for each vertex and state of the field. The
+ * volumes are not exact, and some triangles are turned over: supine_doubt_mend_sample. Each
+ * observed point costs one evaluation of the kernel more for each vertex.
  * @param xyz  [N, 3] mm, written
  * @retval SUPINE_ERROR_ARGUMENT  the state is out of range */
 SUPINE_API supine_status supine_doubt_sample(const supine_doubt *doubt, size_t state, uint64_t seed,

@@ -415,31 +415,46 @@ class Basis:
         _c.expected_error(self._c, wanted, origin, _address(sigma, self.vertex_count, "sigma"))
         return sigma
 
-    def _doubt(self, states: Sequence[Gravity], since: Optional[Gravity], another_day: bool) -> tuple[Any, Any]:
+    def _doubt(self, states: Sequence[Gravity], since: Optional[Gravity], another_day: bool,
+               location: Any = None) -> tuple[Any, Any]:
         """Prepare the random field of the expected error; return it, and the memory that it needs."""
-        space, field = np.empty(_c.doubt_space(len(states))), ctypes.c_void_p()
-        given = (_c.State * len(states))(*(self._judge(_state(state)) for state in states))
+        count = max(1, len(states))  # of located lungs, none is given
+        space, field = np.empty(_c.doubt_space(self._c, count)), ctypes.c_void_p()
+        given = (_c.State * count)(*(self._judge(_state(state)) for state in states))
         origin = None if since is None else ctypes.pointer(self._judge(_state(since)))
-        _c.doubt_prepare(_c.DoubtTask(self._c, len(states), given, origin, another_day), space.ctypes.data, field)
+        _c.doubt_prepare(_c.DoubtTask(self._c, count, given, origin, another_day, location), space.ctypes.data, field)
         return field, space
+
+    def _covariance(self, field: Any, states: int, vertices: Sequence[int]) -> tuple[Doubles, Doubles]:
+        points = [(int(vertex), state) for state in range(states) for vertex in vertices]
+        mean = np.empty((states, len(vertices), 3))
+        covariance = np.empty(mean.shape + mean.shape)
+        _c.doubt_covariance(field, len(points), (_c.DoubtPoint * len(points))(*points), mean.ctypes.data,
+                            covariance.ctypes.data)
+        return mean, covariance
+
+    def _samples(self, field: Any, count: int, seed: int) -> Floats:
+        space, mend = np.empty(_c.doubt_mend_space(self._c)), ctypes.c_void_p()
+        _c.doubt_mend_prepare(field, 0, space.ctypes.data, mend)
+        made = np.empty((count, self.vertex_count, 3), _FLOAT)
+        for index in range(count):
+            _c.doubt_sample(field, 0, seed, index, made[index].ctypes.data)
+            _c.doubt_mend_sample(mend, made[index].ctypes.data)
+        return made
 
     def covariance(self, vertices: Sequence[int], states: Union[Gravity, Sequence[Gravity]],
                    since: Optional[Gravity] = None,
                    *, another_day: bool = False) -> tuple[Doubles, Doubles]:
         """Compute the predicted positions [S, n, 3] of n vertices in S states, mm, and the covariance [S, n, 3, S, n,
         3] of their errors, mm^2. Errors of neighbours are alike: the error of a distance, of a mean or of a plan
-        follows from the covariance, never from `expected_error` alone. Equations and evidence: <supine/doubt.h>.
+        follows from the covariance, never from `expected_error` alone. After a fit of landmarks, which the basis keeps,
+        it is small near them. Equations and evidence: <supine/doubt.h>.
 
         since: state whose positions are exact, if it is not the scan's
         another_day: whether the lungs are those of another day than the scan"""
         wanted = [states] if isinstance(states, str) else list(states)
         field, _space = self._doubt(wanted, since, another_day)
-        points = [(int(vertex), state) for state in range(len(wanted)) for vertex in vertices]
-        mean = np.empty((len(wanted), len(vertices), 3))
-        covariance = np.empty(mean.shape + mean.shape)
-        _c.doubt_covariance(field, len(points), (_c.DoubtPoint * len(points))(*points), mean.ctypes.data,
-                            covariance.ctypes.data)
-        return mean, covariance
+        return self._covariance(field, len(wanted), vertices)
 
     def samples(self, state: Gravity, count: int, seed: int = 0, since: Optional[Gravity] = None, *,
                 another_day: bool = False) -> Floats:
@@ -448,13 +463,7 @@ class Basis:
         state and no folds; points inside them have no surface, and keep no volume. `seed` and the place in the array
         decide a sample. The numbers are those of `supine deform --samples`."""
         field, _space = self._doubt([state], since, another_day)
-        space, mend = np.empty(_c.doubt_mend_space(self._c)), ctypes.c_void_p()
-        _c.doubt_mend_prepare(field, 0, space.ctypes.data, mend)
-        made = np.empty((count, self.vertex_count, 3), _FLOAT)
-        for index in range(count):
-            _c.doubt_sample(field, 0, seed, index, made[index].ctypes.data)
-            _c.doubt_mend_sample(mend, made[index].ctypes.data)
-        return made
+        return self._samples(field, count, seed)
 
     def registration(self, state: Gravity, fiducials: Sequence[int], since: Optional[Gravity] = None, *,
                      another_day: bool = False) -> tuple[Doubles, Doubles, Floats]:
@@ -464,7 +473,7 @@ class Basis:
         target registration error. The same as `supine deform --frame POINTS`."""
         field, _space = self._doubt([state], since, another_day)
         places = (ctypes.c_size_t * len(fiducials))(*map(int, fiducials))
-        space, frame = np.empty(_c.doubt_frame_space(len(fiducials))), ctypes.c_void_p()
+        space, frame = np.empty(_c.doubt_frame_space(self._c, len(fiducials))), ctypes.c_void_p()
         _c.doubt_frame_prepare(field, len(fiducials), places, space.ctypes.data, frame)
         rotation, translation, sigma = np.empty((3, 3)), np.empty(3), np.empty(self.vertex_count, _FLOAT)
         _c.doubt_frame_motion(frame, rotation.ctypes.data, translation.ctypes.data)
@@ -687,6 +696,20 @@ class Location:
         xyz, sigma = np.empty((basis.vertex_count, 3), _FLOAT), np.empty(basis.vertex_count, _FLOAT)
         _c.locate_positions(self._c, basis._c, xyz.ctypes.data, sigma.ctypes.data)
         return xyz, sigma
+
+    def covariance(self, basis: Basis, vertices: Sequence[int]) -> tuple[Doubles, Doubles]:
+        """Compute the positions [n, 3] of n vertices of `basis` in the frame of the observations, mm, and the
+        covariance [n, 3, n, 3] of their errors, mm^2, as `Basis.covariance` does: given the observed points."""
+        field, _space = basis._doubt([], None, False, self._c)
+        mean, covariance = basis._covariance(field, 1, vertices)
+        return mean[0], covariance[0, :, :, 0]
+
+    def samples(self, basis: Basis, count: int, seed: int = 0) -> Floats:
+        """Draw `count` plausible positions [count, N, 3] of the vertices of `basis`, mm, in the frame of the
+        observations, as `Basis.samples` does. They pass near the observed points, within their noise. Surfaces have the
+        volume that was given; where it was fitted, they differ in it."""
+        field, _space = basis._doubt([], None, False, self._c)
+        return basis._samples(field, count, seed)
 
 
 def another_day(same_session: ArrayLike) -> Doubles:

@@ -186,7 +186,7 @@ class LocationInfo(ctypes.Structure):
 class DoubtTask(ctypes.Structure):
     """The C struct supine_doubt_task."""
     _fields_ = [("basis", c_void_p), ("state_count", c_size_t), ("states", POINTER(State)), ("since", POINTER(State)),
-                ("another_day", c_bool)]
+                ("another_day", c_bool), ("location", c_void_p)]
 
 
 class DoubtPoint(ctypes.Structure):
@@ -371,14 +371,14 @@ displace_range = _posed("displace_range", c_void_p, GivenPose, c_size_t, c_size_
 deform_lit_range = _posed("deform_lit_range", c_void_p, GivenPose, c_size_t, c_size_t, c_void_p, c_void_p)
 deform_batch = _posed("deform_batch", c_void_p, c_size_t, POINTER(CPose), c_size_t, c_size_t, c_void_p)
 expected_error = _checked("expected_error", c_void_p, POINTER(State), POINTER(State), c_void_p)
-doubt_space = _declare("doubt_space", c_size_t, c_size_t)
+doubt_space = _declare("doubt_space", c_size_t, c_void_p, c_size_t)
 doubt_prepare = _checked("doubt_prepare", POINTER(DoubtTask), c_void_p, POINTER(c_void_p))
 doubt_covariance = _checked("doubt_covariance", c_void_p, c_size_t, POINTER(DoubtPoint), c_void_p, c_void_p)
 doubt_sample = _checked("doubt_sample", c_void_p, c_size_t, c_uint64, c_size_t, c_void_p)
 doubt_mend_space = _declare("doubt_mend_space", c_size_t, c_void_p)
 doubt_mend_prepare = _checked("doubt_mend_prepare", c_void_p, c_size_t, c_void_p, POINTER(c_void_p))
 doubt_mend_sample = _checked("doubt_mend_sample", c_void_p, c_void_p)
-doubt_frame_space = _declare("doubt_frame_space", c_size_t, c_size_t)
+doubt_frame_space = _declare("doubt_frame_space", c_size_t, c_void_p, c_size_t)
 doubt_frame_prepare = _checked("doubt_frame_prepare", c_void_p, c_size_t, POINTER(c_size_t), c_void_p,
                                POINTER(c_void_p))
 doubt_frame_motion = _declare("doubt_frame_motion", None, c_void_p, c_void_p, c_void_p)
