@@ -17,8 +17,8 @@ const bytes = readFileSync(demo);
 await checkAll(async (basis, states) => pose(await open(readFileSync(basis)), states));
 
 /* supine.wasm has at most 178 kB, and at most 73 kB if compressed: 51 before it held what the page needs (files made in
- * memory, weights for GLSL, the range of simulated volumes) and the facts about a basis, 56 before it held the random
- * field of the expected error (covariances, registrations and samples), and 66 before kriging with a fit's landmarks. */
+ * memory, weights for GLSL, the range of simulated volumes) and the facts about a basis, 56 before the random field of
+ * the expected error (covariances, registrations, samples), and 66 before kriging with a fit's landmarks. */
 const wasm = readFileSync(join(packed, 'supine.wasm'));
 const small = brotliCompressSync(wasm).length;
 console.log(`supine.wasm: ${wasm.length} bytes, ${small} with brotli`);
