@@ -105,8 +105,8 @@ TEST(test_expected_error_from_impossible_state_refused) {
   supine_state from;
   supine_error error = {0};
   assert_int_equal(supine_state_parse("supine:90L", &from, &error), SUPINE_OK);
-  const supine_doubt_task task = {w->basis, 1, w->states, &from, false};
-  assert_true(supine_doubt_space(1) <= sizeof space / sizeof *space);
+  const supine_doubt_task task = {w->basis, 1, w->states, &from, false, NULL};
+  assert_true(supine_doubt_space(w->basis, 1) <= sizeof space / sizeof *space);
   assert_int_equal(supine_expected_error(w->basis, w->states, &from, sigma, &error),
                    SUPINE_ERROR_NUMERICAL);
   assert_says(error.message, "supine at 90000 mL");
