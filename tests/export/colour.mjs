@@ -62,12 +62,14 @@ const VISION = {
 const APART = 0.045; // OKLab
 const linear = (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4);
 const coded = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+/** Return a colour as someone with the cones `rows` sees it, in OKLab. */
+function seenAs(rows, hex) {
+  const rgb = Array.from(Buffer.from(hex.slice(1), 'hex'), linear);
+  const cones = rows.map((row) => row.reduce((sum, part, k) => sum + part * rgb[k], 0));
+  return oklab(cones.map((x) => coded(Math.min(1, Math.max(0, x)))));
+}
 for (const [name, rows] of Object.entries(VISION)) {
-  const seen = anatomyColours.map((hex) => {
-    const rgb = Array.from(Buffer.from(hex.slice(1), 'hex'), linear);
-    const cones = rows.map((row) => row.reduce((sum, part, k) => sum + part * rgb[k], 0));
-    return oklab(cones.map((x) => coded(Math.min(1, Math.max(0, x)))));
-  });
+  const seen = anatomyColours.map((hex) => seenAs(rows, hex));
   seen.forEach((a, i) =>
     seen.slice(0, i).forEach((b, j) => {
       const far = Math.hypot(...a.map((x, k) => x - b[k]));
@@ -76,8 +78,20 @@ for (const [name, rows] of Object.entries(VISION)) {
   );
 }
 
+// The selected target and the others differ in lightness in the picture of the page, with each kind of colour vision, and
+// by a ring in its list, whose colours must have contrast with the paper. Pictures: tests/program/test_render.c.
+const [, stage] = page.match(/#stage \{([^}]*)\}/);
+const [other, selected] = ['accent', 'change'].map((name) => new RegExp(`--${name}: (#[0-9a-f]{6})`).exec(stage)[1]);
+const plain = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+for (const [name, rows] of Object.entries({ plain, ...VISION })) {
+  const far = Math.abs(seenAs(rows, other)[0] - seenAs(rows, selected)[0]);
+  assert.ok(far > 0.05, `${name}: ${other} and ${selected} differ by ${far.toFixed(3)} in lightness`);
+}
+assert.match(page, /\.chosen th button::before \{[^}]*box-shadow: 0 0 0 2px/);
+
 // The colour bar of the report shows the colour map of displacements.
-supine('compare', join(folder, 'lungs.safetensors'), '--postures', 'supine,prone', '-o', join(folder, 'report.html'));
+const postures = 'supine,prone,left,right,upright,supine+15';
+supine('compare', join(folder, 'lungs.safetensors'), '--postures', postures, '-o', join(folder, 'report.html'));
 const report = readFileSync(join(folder, 'report.html'), 'utf8');
 const bytesOf = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const apart = (hex, name, i) =>
@@ -91,6 +105,14 @@ for (const stops of bars) {
   );
   assert.ok(Math.min(...off) <= 3, `colours of a bar differ by ${off}: ${stops}`);
 }
+
+// Lines of two postures of the report differ in lightness or in their dashes.
+const lines = [...report.matchAll(/class="key".*?stroke="(#[0-9a-f]{6})".*?stroke-dasharray="([^"]*)"/g)];
+const keys = new Map(lines.map(([, hex, dash]) => [hex, { light: oklab(bytesOf(hex))[0], dash }]));
+assert.equal(keys.size, 6);
+for (const [a, { light, dash }] of keys)
+  for (const [b, of] of keys)
+    assert.ok(a === b || dash !== of.dash || Math.abs(light - of.light) > 0.05, `lines ${a} and ${b}`);
 
 // Ranges end at the same round numbers as those of pictures and reports: the cases are from
 // tests/program/test_render.c.

@@ -90,6 +90,16 @@ TEST(test_colours_increasing_value_even_steps_of_lightness) {
   }
 }
 
+TEST(test_palette_targets_differ_in_lightness) {
+  double light[2];
+  for (size_t i = 0; i < 2; ++i) {
+    const uint32_t tint = supine_render_palette(SUPINE_PALETTE_TARGETS, i);
+    const double rgb[3] = {(tint >> 16) / 255.0, (tint >> 8 & 255U) / 255.0, (tint & 255U) / 255.0};
+    light[i] = lightness(rgb);
+  }
+  assert_true(light[0] - light[1] > 10);
+}
+
 TEST(test_colours_out_of_range_clamped) {
   static const supine_colours map = SUPINE_COLOURS_DIFFERENCE;
   double a[3];

@@ -128,13 +128,26 @@ static double line_distance(const double a[2], const double b[2], const double a
   return hypot(a[0] + share * d[0] - at[0], a[1] + share * d[1] - at[1]);
 }
 
+/* Return whether the line from `a` to `b` crosses a box, at one of some points along it. */
+static bool crosses(const double a[2], const double b[2], const double box[4]) {
+  enum { POINTS = 24 };
+  for (int i = 0; i <= POINTS; ++i) {
+    const double share = (double)i / POINTS;
+    const double at[2] = {a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])};
+    if (box_distance(box, at) <= 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Return whether a mark is that of a large structure, on which its name is written. */
 static bool is_shell(const shown *m) {
   return m->mark->kind == SUPINE_MARK_ANATOMY;
 }
 
-/* Return what a name in `box` would hide: balls, rings and ghosts, and names 0 to `before` - 1, and
- * what the line to its mark would cross. */
+/* Return what a name in `box` would hide: balls, rings and ghosts, names that were placed before it
+ * and their lines, and what the line to its mark would cross. */
 static double cost_of(const sketch *s, size_t own, const double box[4]) {
   const double gap = 0.15 * s->style->font;
   double end[2];
@@ -152,9 +165,11 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
     if (i < own) {
       const bool apart = box[0] > m->box[2] + gap || m->box[0] > box[2] + gap ||
                          box[1] > m->box[3] + gap || m->box[1] > box[3] + gap;
-      const double middle[2] = {(m->box[0] + m->box[2]) / 2, (m->box[1] + m->box[3]) / 2};
+      double other[2];
+      nearest_of(m->box, m->at, other);
       cost += apart ? 0.0 : 4.0;
-      cost += line_distance(s->mark[own].at, end, middle) < s->face.size;
+      cost += crosses(s->mark[own].at, end, m->box) ? 2.0 : 0.0;
+      cost += crosses(m->at, other, box) ? 2.0 : 0.0;
     }
   }
   const bool inside = box[0] >= 0.0 && box[2] <= s->width && box[1] >= 0.0 && box[3] <= s->height;
