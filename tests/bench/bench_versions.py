@@ -3,13 +3,14 @@
 """Compare two versions of the program: run each command in turn with the old and the new one.
 
     bench_versions.py path/to/old/supine path/to/new/supine [--vertices N] [--rounds R] [--folder F]
-                      [--stream path/to/bench_stream]
+                      [--stream path/to/bench_stream] [--only WORD]
 
 The old version makes the meshes, and each version its own bases. Print the least wall and processor seconds and the
 largest memory of R rounds for both versions, and the ratios of new to old. Count the bytes in which outputs differ,
 except in VTP. A row is missing if a version lacks the command. The library of a program must be
 runtime/libsupine_runtime.so in the program's folder. --stream adds the median time from sending a pose to receiving its
-last point, the least of R rounds.
+last point, the least of R rounds. --only leaves out all but the commands whose name has WORD: with '--only render' the
+ratio of the processor time of translucent shells to that of coloured lungs follows.
 
 Versions before 0.3.0 wrote basis files of other formats. Expected differences from version 0.2.0:
 - deform --image, --labels: the factors of a lung's displacement now differ between axes, which changes
@@ -85,7 +86,7 @@ def count_differences(first, second):
 
 def compare(name, programs, arguments, rounds, output=None):
     """Run both programs in turn in their folders, 0 and 1, with these arguments, of which `output` is the file written.
-    Print a row of results."""
+    Print a row of results. Return the processor seconds of both, or None."""
     best = [[float("inf"), float("inf"), 0.0] for _ in programs]
     for _ in range(rounds):
         for which, program in enumerate(programs):
@@ -94,7 +95,7 @@ def compare(name, programs, arguments, rounds, output=None):
             os.chdir("..")
             if used is None:
                 print(f"{name:28} fails in {program}")
-                return
+                return None
             wall, cpu, memory = used
             best[which] = [min(best[which][0], wall), min(best[which][1], cpu),
                            max(best[which][2], memory)]
@@ -104,6 +105,7 @@ def compare(name, programs, arguments, rounds, output=None):
           f"{old[1]:8.3f} {new[1]:8.3f} {new[1] / old[1]:6.2f}   "
           f"{old[2]:7.0f} {new[2]:7.0f} {new[2] / old[2]:6.2f}"
           f"{f'   outputs differ in {differing} bytes' if differing else ''}", flush=True)
+    return old[1], new[1]
 
 
 # A Python program that opens a basis five times and prints the processor seconds of the fastest.
@@ -189,6 +191,8 @@ def write_inputs(programs, vertices):
         make(which, "embed", "small.safetensors", "--grid", "4", "-o", "grid.safetensors")
 
 
+PANELS = ["large.safetensors", "--posture", "supine,prone,left,right,upright",
+          "--view", "anterior,posterior,left,right", "-o", "panels.png"]
 # Name, arguments and output of each command that is timed.
 ROWS = [
     ("--help", ["--help"], None),
@@ -219,9 +223,8 @@ ROWS = [
       "breath.vtp"], None),
     ("validate", ["validate", "large.safetensors", "--state", "prone:rest:state.ply"],
      None),
-    ("render, 20 panels",
-     ["render", "large.safetensors", "--posture", "supine,prone,left,right,upright",
-      "--view", "anterior,posterior,left,right", "-o", "panels.png"], "panels.png"),
+    ("render, 20 panels", ["render", *PANELS], "panels.png"),
+    ("render, 20 coloured panels", ["render", *PANELS, "--look", "displacement"], "panels.png"),
     ("precompute", ["precompute", "large.ply", "-o", "made.safetensors"], None),
     ("precompute, 100,000 vertices", ["precompute", "middle.ply", "-o", "made.safetensors"],
      None),
@@ -229,6 +232,19 @@ ROWS = [
      ["precompute", "large.ply", "--band", "3", "--modes", "harmonics", "-o",
       "made.safetensors"], None),
 ]
+
+
+def compare_library(programs, vertices, rounds):
+    """Print rows of the time in which the libraries open and pose bases."""
+    libraries = [os.path.join(os.path.dirname(program), "runtime", "libsupine_runtime.so") for program in programs]
+    compare_numbers("opening, processor s",
+                    [[sys.executable, "-c", OPEN, library, f"{which}/large.safetensors"]
+                     for which, library in enumerate(libraries)], rounds, float)
+    for name, count in (("large", vertices), ("small", "20000")):
+        for what in ("positions", "lit"):
+            compare_numbers(f"{what}, {name}, processor ms",
+                            [[sys.executable, "-c", POSE, library, f"{which}/{name}.safetensors", count, what]
+                             for which, library in enumerate(libraries)], rounds, float)
 
 
 def main():
@@ -239,6 +255,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--folder")
     parser.add_argument("--stream")
+    parser.add_argument("--only", default="")
     chosen = parser.parse_args()
     programs = [os.path.abspath(chosen.old), os.path.abspath(chosen.new)]
     stream = None if chosen.stream is None else os.path.abspath(chosen.stream)
@@ -249,24 +266,22 @@ def main():
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")
         print(f"{'':28}" + 3 * f" {'old':>8} {'new':>8} {'ratio':>6}  ")
-        libraries = [os.path.join(os.path.dirname(program), "runtime", "libsupine_runtime.so")
-                     for program in programs]
-        compare_numbers("opening, processor s",
-                        [[sys.executable, "-c", OPEN, library, f"{which}/large.safetensors"]
-                         for which, library in enumerate(libraries)], chosen.rounds, float)
-        for name, count in (("large", chosen.vertices), ("small", "20000")):
-            for what in ("positions", "lit"):
-                compare_numbers(f"{what}, {name}, processor ms",
-                                [[sys.executable, "-c", POSE, library, f"{which}/{name}.safetensors", count, what]
-                                 for which, library in enumerate(libraries)], chosen.rounds, float)
+        if not chosen.only:
+            compare_library(programs, chosen.vertices, chosen.rounds)
         if stream is not None:
             compare_numbers("stream of points, median ms",
                             [[stream, program, f"{which}/large.safetensors", "3", "points"]
                              for which, program in enumerate(programs)], chosen.rounds,
                             lambda said: float(said.splitlines()[1].split()[5]))
+        seconds = {}
         for name, arguments, output in ROWS:
-            rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
-            compare(name, programs, arguments, rounds, output)
+            if chosen.only in name:
+                rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
+                seconds[name] = compare(name, programs, arguments, rounds, output)
+        shells, coloured = [seconds.get(name) for name in ("render, 20 panels", "render, 20 coloured panels")]
+        if shells and coloured:
+            ratios = [f"{shell / other:.2f}" for shell, other in zip(shells, coloured)]
+            print(f"shells / coloured lungs, processors: {' '.join(ratios)}")
 
 
 if __name__ == "__main__":

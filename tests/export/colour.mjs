@@ -78,8 +78,8 @@ for (const [name, rows] of Object.entries(VISION)) {
   );
 }
 
-// The selected target and the others differ in lightness in the picture of the page, with each kind of colour vision, and
-// by a ring in its list, whose colours must have contrast with the paper. Pictures: tests/program/test_render.c.
+// The selected target and the others differ in lightness in the picture of the page, with each kind of colour vision,
+// and by a ring in its list, whose colours must have contrast with the paper. Pictures: tests/program/test_render.c.
 const [, stage] = page.match(/#stage \{([^}]*)\}/);
 const [other, selected] = ['accent', 'change'].map((name) => new RegExp(`--${name}: (#[0-9a-f]{6})`).exec(stage)[1]);
 const plain = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
