@@ -43,7 +43,7 @@ build_tests() {
   command -v chromium >/dev/null || quick="$quick chromium"
   # shellcheck disable=SC2086
   install_missing $build $quick "$@"
-  [ -d tests/export/node_modules/vtk.js ] && [ -d tests/export/node_modules/@cyclonedx ] ||
+  [ -d tests/export/node_modules/vtk.js ] && [ -d tests/export/node_modules/tinyusdz ] ||
     npm install --prefix tests/export --no-package-lock --no-audit --no-fund --silent ||
     echo "npm could not install vtk.js and other packages: tests that need them are skipped" >&2
   cmake --preset release -DBUILD_TESTING=ON

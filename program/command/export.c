@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* supine export: write a basis as a page for the browser, or as glTF morph targets. */
+/* supine export: write a basis as a page for the browser, or as glTF or OpenUSD morph targets. */
 #include <string.h>
 
 #include <export.h>
@@ -32,9 +32,11 @@ static const supine_option table[] = {
     {"output", 'o', "FILE",
      ".html: a page to explore the lungs in a browser, in one file that needs no network. The "
      "basis may have up to 128 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms "
-     "the lungs",
+     "the lungs\n.usda: an OpenUSD text file with the same targets as blend shapes, and time "
+     "samples "
+     "of breaths during a full turn; about 5000 vertices, if --simplify gives no other number",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
-     .endings = ".html or .glb"},
+     .endings = ".html, .glb or .usda"},
     {"breath", 0, "VOLUME",
      "tidal volume of the breath shown. Up to this volume, the weights of morph targets stay "
      "between 0 and 1",
@@ -77,22 +79,32 @@ static void print_simplified(const supine_basis *basis, const export_written *wr
                               written->largest));
 }
 
-static supine_status write_glb(const supine_basis *basis, const request *wanted,
-                               supine_error *error) {
+/* Write a model for engines, and print what it holds. */
+static supine_status write_model(const supine_basis *basis, const request *wanted,
+                                 supine_error *error) {
+  const bool usd = supine_text_ends_in(wanted->path, ".usda");
   export_written written;
-  SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &written, error));
+  const char *holds = wanted->glb.animate ? "morph targets and animations" : "morph targets";
+  const char *after = "";
+  if (usd) {
+    holds = "blend shapes and an animation";
+    SUPINE_TRY(supine_export_usd_write(wanted->path, basis, wanted->glb.breath, wanted->simplify,
+                                       &written, error));
+  } else {
+    SUPINE_TRY(supine_export_glb_write(wanted->path, basis, &wanted->glb, &written, error));
+    if (!wanted->glb.plain) {
+      after = ", compressed; for model-viewer, set its meshoptDecoderLocation or use --plain";
+    }
+  }
   const size_t bytes = written.bytes;
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
   const bool small = bytes < 100000;
-  supine_options_line("%s: %zu lung%s with morph targets%s, %.*f %s%s\n", wanted->path, lungs,
-                      lungs == 1 ? "" : "s", wanted->glb.animate ? " and animations" : "",
-                      small ? 0 : 2, (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB",
-                      wanted->glb.plain ? ""
-                                        : ", compressed; for model-viewer, set its "
-                                          "meshoptDecoderLocation or use --plain");
+  supine_options_line("%s: %zu lung%s with %s, %.*f %s%s\n", wanted->path, lungs,
+                      lungs == 1 ? "" : "s", holds, small ? 0 : 2,
+                      (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB", after);
   SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
                               "lungs", (json_int_t)lungs, "bytes", (json_int_t)bytes));
-  if (wanted->simplify > 0) {
+  if (written.vertices < supine_basis_get_info(basis)->vertex_count) {
     print_simplified(basis, &written);
   }
   return SUPINE_OK;
@@ -201,8 +213,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   wanted->glb.simplify = wanted->simplify;
   const bool page = supine_text_ends_in(wanted->path, ".html");
   SUPINE_FREED_BY(supine_options_basis_close) supine_basis *basis = NULL;
-  SUPINE_REFUSE_IF(page && wanted->glb_only, error, SUPINE_ERROR_ARGUMENT,
-                   "--plain and --animate need an output that ends in .glb");
+  SUPINE_REFUSE_IF(wanted->glb_only && !supine_text_ends_in(wanted->path, ".glb"), error,
+                   SUPINE_ERROR_ARGUMENT, "--plain and --animate need an output that ends in .glb");
   const char *of_page =
       wanted->title != NULL ? "--title" : NULL; /* an option that only pages take */
   if (wanted->from.given) {
@@ -224,17 +236,18 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   if (wanted->breathes) {
     SUPINE_TRY(judge_breath(basis, wanted->glb.breath, error));
   }
-  return page ? write_page(basis, wanted, path, error) : write_glb(basis, wanted, error);
+  return page ? write_page(basis, wanted, path, error) : write_model(basis, wanted, error);
 }
 
 const supine_command supine_command_export = {
     name,
-    "write a basis as a page or as glTF morph targets",
-    .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]",
+    "write a basis as a page, or as glTF or OpenUSD morph targets",
+    .usage = "BASIS -o lungs.html [OPTIONS]\nBASIS -o lungs.glb [OPTIONS]\n"
+             "BASIS -o lungs.usda [OPTIONS]",
     .about =
         "Writes a page that shows, in any browser, how the lungs deform as the patient turns and "
-        "breathes and, with --inside, where each target goes and how sure that is; or a glTF "
-        "model for engines. The ending of the output's name selects the format.",
+        "breathes and, with --inside, where each target goes and how sure that is; or a glTF or "
+        "OpenUSD model for engines. The ending of the output's name selects the format.",
     .options = table,
     .notes = "In a .glb file, each lung is a mesh with its own weights; the file's extras say how "
              "to compute them from gravity and volume.\n"

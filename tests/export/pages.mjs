@@ -17,6 +17,7 @@ const all = [
   'page_room',
   'page_views',
   'page_simplified',
+  'page_usd',
   'page_sizes',
   'page_still',
   'accessibility',

@@ -80,6 +80,7 @@ export lungs.safetensors -o out/a.html
 export lungs.safetensors --inside points.safetensors -o out/a.html
 export lungs.safetensors -o out/a.glb
 export lungs.safetensors -o out/a.glb --plain --animate
+export lungs.safetensors -o out/a.usda
 locate lungs.safetensors points.csv --points points.safetensors --posture prone -o out/a.csv
 locate lungs.safetensors points.csv --points points.safetensors --posture prone --samples 2 -o out/a.safetensors
 pv show patient.pv.json

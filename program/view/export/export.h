@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /** @file
- * Export the lungs of a basis file as an HTML page or as a glTF file with morph targets. */
+ * Export the lungs of a basis file as an HTML page, or as a glTF or OpenUSD file with morph
+ * targets. */
 #ifndef SUPINE_EXPORT_H
 #define SUPINE_EXPORT_H
 
@@ -46,6 +47,16 @@ supine_status supine_export_glb_write(const char *path, const supine_basis *basi
                                       const export_glb_options *options, export_written *written,
                                       supine_error *error);
 
+/** Write an OpenUSD text file (.usda). Each lung is a mesh whose blend shapes are the morph targets
+ * above; weights outside 0 to 1 are allowed. Time samples of the weights and of the patient's roll
+ * show breaths of `breath` mL during a full turn. Units are millimetres, y points up. Names of
+ * lungs are made identifiers; metadata keep them, and what the basis assumes.
+ * @param simplify  approximate number of vertices to keep; 0 for 5000, as the file is text
+ * @param written   output; bytes is 0 if the output is a pipe */
+supine_status supine_export_usd_write(const char *path, const supine_basis *basis, double breath,
+                                      size_t simplify, export_written *written,
+                                      supine_error *error);
+
 /** Options of the exported HTML page. */
 typedef struct export_page {
   double breath;                             /**< tidal volume, mL */
@@ -59,7 +70,7 @@ typedef struct export_page {
   const supine_options_names *names; /**< names of the structures; unused if `inside` is NULL */
   json_t *still; /**< what is shown where no script may run: the members of {{#still}} in
                           page.html; NULL for nothing */
-  bool live;                         /**< true to show also the states that 'supine stream' sends */
+  bool live;     /**< true to show also the states that 'supine stream' sends */
 } export_page;
 
 /** Print one self-contained HTML page that shows the lungs in a browser (WebGL 2) without a

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 
 #include "program/view/export/glb.h"
+#include "program/view/export/moments.h"
 
 static const double pi = 3.14159265358979323846;
-enum { RATE = 6 /* frames per second */, POSTURES = 4, SECONDS = 6, BREATH_SECONDS = 3 };
 
 /* At a roll of t radians, gravity in the patient's axes (LPS) is (sin t, cos t, 0). In glTF's axes
  * the patient turns by t about y, the body's long axis, then by -90 degrees about x to lie down. */
@@ -20,25 +20,12 @@ void supine_export_glb_rotation(double roll, float q[4]) {
   q[3] = (float)c;
 }
 
-/* Return the patient's roll, radians, in the animation "turning". Each posture takes SECONDS: the
- * patient lies still for the first half of this time, then turns to the next posture. */
-static double roll_at(double seconds) {
-  const double stage = floor(seconds / SECONDS);
-  const double x = fmax(0, 2 * (seconds / SECONDS - stage) - 1);
-  return pi / 2 * (stage + x * x * (3 - 2 * x));
-}
-
 /* Compute one frame: the weights of all morph targets, `seconds` after the start of a breath.
  * `rows` points to this frame of lung 0 in an array [lungs, frames, targets]. */
 static void make_frame(glb *g, double roll, double seconds, float *rows, size_t frames) {
-  const double gravity[3] = {sin(roll), cos(roll), 0};
-  const double fraction = 0.5 - 0.5 * cos(2 * pi * seconds / BREATH_SECONDS);
   double weights[EXPORT_TARGETS_MAX];
-  supine_pose pose;
-  /* No failure is expected, because supine_export_targets_choose has checked this breath. */
-  (void)supine_export_breath_pose(g->basis, g->options->breath, gravity, fraction, &pose, NULL);
   for (size_t i = 0; i < g->info->lung_count; ++i) {
-    supine_export_targets_weights(&g->targets, &pose, i, weights);
+    supine_export_moment(&g->targets, roll, seconds, i, weights);
     for (size_t j = 0; j < g->targets.count; ++j) {
       rows[i * frames * g->targets.count + j] = (float)weights[j];
     }
@@ -48,7 +35,7 @@ static void make_frame(glb *g, double roll, double seconds, float *rows, size_t 
 /* Append an animation of breathing at `roll` radians, or during one full turn if `roll` is NAN. */
 static void add(glb *g, json_t *animations, const char *name, double roll, size_t seconds) {
   const size_t count = g->info->lung_count;
-  const size_t frames = RATE * seconds + 1;
+  const size_t frames = EXPORT_RATE * seconds + 1;
   const size_t targets = g->targets.count;
   SUPINE_ARENA arena = {0};
   float *times = supine_arena_take(&arena, frames, sizeof *times);
@@ -59,8 +46,8 @@ static void add(glb *g, json_t *animations, const char *name, double roll, size_
     return;
   }
   for (size_t i = 0; i < frames; ++i) {
-    const double at = (double)i / RATE;
-    const double turned = isnan(roll) ? roll_at(at) : roll;
+    const double at = (double)i / EXPORT_RATE;
+    const double turned = isnan(roll) ? supine_export_roll(at) : roll;
     times[i] = (float)at;
     supine_export_glb_rotation(turned, rotations + 4 * i);
     make_frame(g, turned, at, weights + i * targets, frames);
@@ -84,11 +71,11 @@ static void add(glb *g, json_t *animations, const char *name, double roll, size_
 }
 
 void supine_export_glb_animate(glb *g) {
-  static const char *const names[POSTURES] = {"supine", "left side", "prone", "right side"};
+  static const char *const names[EXPORT_POSTURES] = {"supine", "left side", "prone", "right side"};
   json_t *animations = json_array();
-  add(g, animations, "turning", NAN, SECONDS * POSTURES);
-  for (size_t p = 0; p < POSTURES; ++p) {
-    add(g, animations, names[p], (double)p * pi / 2, BREATH_SECONDS);
+  add(g, animations, "turning", NAN, EXPORT_SECONDS * EXPORT_POSTURES);
+  for (size_t p = 0; p < EXPORT_POSTURES; ++p) {
+    add(g, animations, names[p], (double)p * pi / 2, EXPORT_BREATH_SECONDS);
   }
   (void)json_object_set_new(g->root, "animations", animations);
 }
