@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Decide by its shape whether a part inside the lungs is compact. */
 #include <math.h>
-#include <string.h>
 
 #include "base/arena.h"
 #include "base/vec3.h"
@@ -57,70 +56,122 @@ static uint32_t root_of(uint32_t *parent, uint32_t i) {
   return i;
 }
 
-/* Return six times the signed volume of the tetrahedron of a triangle and `origin`, and its corners
- * relative to `origin`. */
-static double take_corners(const supine_mesh *mesh, size_t triangle, const double origin[3],
-                           double corner[3][3]) {
-  for (size_t c = 0; c < 3; ++c) {
-    const double *p = mesh->vertices + 3 * (size_t)mesh->triangles[3 * triangle + c];
-    supine_subtract(p, origin, corner[c]);
-  }
-  return supine_triple(corner[0], corner[1], corner[2]);
-}
-
-supine_status supine_mesh_solid(const supine_mesh *mesh, double *volume, double covariance[3][3]) {
-  const double *origin = mesh->vertices; /* the first vertex, so that products stay small */
-  SUPINE_ARENA arena = {0};
-  uint32_t *parent = supine_arena_take(&arena, mesh->vertex_count, sizeof *parent);
-  double *sixfold = supine_arena_zeros(&arena, mesh->vertex_count, sizeof *sixfold);
-  double corner[3][3];
-  double sum = 0.0;
-  double mean[3] = {0.0, 0.0, 0.0};
-  double normal[3] = {0.0, 0.0, 0.0}; /* sum of the vectors of area, 0 for a closed surface */
-  double area = 0.0;
-  SUPINE_TRY(supine_arena_status(&arena));
-  memset(covariance, 0, 9 * sizeof covariance[0][0]);
+/* Number the connected components of a mesh, and return how many there are.
+ * @param component  [vertex_count] written: index of the component of each vertex */
+static size_t number_components(const supine_mesh *mesh, uint32_t *component) {
+  size_t count = 0;
   for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
-    parent[i] = i;
+    component[i] = i;
   }
   for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
     const uint32_t next = mesh->triangles[i % 3 < 2 ? i + 1 : i - 2];
-    parent[root_of(parent, mesh->triangles[i])] = root_of(parent, next);
+    const uint32_t a = root_of(component, mesh->triangles[i]);
+    const uint32_t b = root_of(component, next);
+    component[a > b ? a : b] = a < b ? a : b;
   }
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    double cross[3];
-    sixfold[root_of(parent, mesh->triangles[3 * t])] += take_corners(mesh, t, origin, corner);
-    supine_subtract(corner[1], corner[0], corner[1]);
-    supine_subtract(corner[2], corner[0], corner[2]);
-    supine_cross(corner[1], corner[2], cross);
-    area += supine_length(cross);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) { /* parents have lower indices */
+    component[i] = component[i] == i ? (uint32_t)count++ : component[component[i]];
+  }
+  return count;
+}
+
+/* What a component encloses: moments of the solid, relative to the first vertex of the mesh, so
+ * that products stay small. */
+typedef struct solid {
+  double sum;             /* signed volume, mm^3; negative if the component is turned inwards */
+  double mean[3];         /* integral of the position, mm^4 */
+  double square[9];       /* integral of the products of two coordinates, mm^5 */
+  double normal[3], area; /* sum of its vectors of area, 0 if it is closed, and area; twice, mm^2 */
+  double low[3], high[3]; /* its box, mm */
+  uint32_t part;          /* 1 + index of the compact part that it belongs to; 0 if none */
+} solid;
+
+static void add_triangle(const supine_mesh *mesh, const uint32_t *triangle, solid *s) {
+  double corner[3][3];
+  double cross[3];
+  double all[3] = {0.0, 0.0, 0.0};
+  for (size_t c = 0; c < 3; ++c) {
+    supine_subtract(mesh->vertices + 3 * (size_t)triangle[c], mesh->vertices, corner[c]);
+    supine_box_add(corner[c], s->low, s->high);
     for (size_t k = 0; k < 3; ++k) {
-      normal[k] += cross[k];
+      all[k] += corner[c][k];
     }
   }
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const double v = take_corners(mesh, t, origin, corner) / 6.0;
-    if (sixfold[root_of(parent, mesh->triangles[3 * t])] <= 0.0) {
+  const double v = supine_triple(corner[0], corner[1], corner[2]) / 6.0;
+  supine_normal(corner[0], corner[1], corner[2], cross);
+  s->sum += v;
+  s->area += supine_length(cross);
+  for (size_t k = 0; k < 3; ++k) {
+    s->mean[k] += v * all[k] / 4.0;
+    s->normal[k] += cross[k];
+  }
+  for (size_t k = 0; k < 9; ++k) {
+    const size_t a = k / 3;
+    const size_t b = k % 3;
+    s->square[k] += v / 20.0 *
+                    (all[a] * all[b] + corner[0][a] * corner[0][b] + corner[1][a] * corner[1][b] +
+                     corner[2][a] * corner[2][b]);
+  }
+}
+
+/* Return whether a component is closed, faces outwards and is compact. Its cavities count as solid.
+ */
+static bool is_compact(const solid *s) {
+  double covariance[3][3];
+  if (!(s->sum > 0.0) || supine_length(s->normal) >= gap_share * s->area) {
+    return false;
+  }
+  for (size_t k = 0; k < 9; ++k) {
+    covariance[k / 3][k % 3] =
+        s->square[k] / s->sum - s->mean[k / 3] / s->sum * (s->mean[k % 3] / s->sum);
+  }
+  return supine_mesh_is_compact(1e-3 * s->sum, (const double(*)[3])covariance);
+}
+
+/* Return whether the box of `outer` contains that of `inner`. */
+static bool contains(const solid *outer, const solid *inner) {
+  bool within = true;
+  for (size_t k = 0; k < 3; ++k) {
+    within = within && outer->low[k] <= inner->low[k] && inner->high[k] <= outer->high[k];
+  }
+  return within;
+}
+
+/* Give each cavity, which faces inwards, the part of the smallest solid whose box contains it. */
+static void place_cavities(solid *solids, size_t count) {
+  for (solid *cavity = solids; cavity < solids + count; ++cavity) {
+    const solid *around = NULL;
+    if (cavity->sum >= 0.0) {
       continue;
     }
-    sum += v;
-    for (size_t k = 0; k < 9; ++k) {
-      const size_t a = k / 3;
-      const size_t b = k % 3;
-      const double all[2] = {corner[0][a] + corner[1][a] + corner[2][a],
-                             corner[0][b] + corner[1][b] + corner[2][b]};
-      mean[a] += b == 0 ? v * all[0] / 4.0 : 0.0;
-      covariance[a][b] += v / 20.0 *
-                          (all[0] * all[1] + corner[0][a] * corner[0][b] +
-                           corner[1][a] * corner[1][b] + corner[2][a] * corner[2][b]);
+    for (const solid *s = solids; s < solids + count; ++s) {
+      if (s->sum > 0.0 && contains(s, cavity) && (around == NULL || s->sum < around->sum)) {
+        around = s;
+      }
     }
+    cavity->part = around != NULL ? around->part : 0;
   }
-  if (sum > 0.0) {
-    for (size_t k = 0; k < 9; ++k) {
-      covariance[k / 3][k % 3] =
-          covariance[k / 3][k % 3] / sum - mean[k / 3] / sum * (mean[k % 3] / sum);
-    }
+}
+
+supine_status supine_mesh_find_compact(const supine_mesh *mesh, uint32_t *part, uint32_t *count) {
+  SUPINE_ARENA arena = {0};
+  const size_t found = number_components(mesh, part);
+  solid *solids = supine_arena_zeros(&arena, found, sizeof *solids);
+  *count = 0;
+  SUPINE_TRY(supine_arena_status(&arena));
+  for (size_t i = 0; i < found; ++i) {
+    supine_box_begin(solids[i].low, solids[i].high);
   }
-  *volume = supine_length(normal) < gap_share * area ? 1e-3 * sum : 0.0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *triangle = mesh->triangles + 3 * t;
+    add_triangle(mesh, triangle, &solids[part[triangle[0]]]);
+  }
+  for (size_t i = 0; i < found; ++i) {
+    solids[i].part = is_compact(&solids[i]) ? ++*count : 0;
+  }
+  place_cavities(solids, found);
+  for (size_t i = 0; i < mesh->vertex_count; ++i) {
+    part[i] = solids[part[i]].part;
+  }
   return SUPINE_OK;
 }

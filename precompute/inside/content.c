@@ -6,8 +6,8 @@
 #include "base/arena.h"
 #include "base/text.h"
 
-#include "mesh/io/points.h"
 #include "mesh/compact.h"
+#include "mesh/io/points.h"
 #include "precompute/inside/content.h"
 
 /* Make room for more points, triangles and bytes of names. */
@@ -16,9 +16,11 @@ static supine_status reserve(supine_inside_content *content, size_t points, size
   const size_t used = content->names != NULL ? strlen(content->names) : 0;
   const size_t sizes[] = {3 * (content->count + points) * sizeof *content->points,
                           (content->count + points) * sizeof *content->part,
+                          (content->count + points) * sizeof *content->rigid,
                           3 * (content->triangle_count + triangles) * sizeof *content->triangles,
                           used + names};
-  void *const arrays[] = {&content->points, &content->part, &content->triangles, &content->names};
+  void *const arrays[] = {&content->points, &content->part, &content->rigid, &content->triangles,
+                          &content->names};
   for (size_t i = 0; i < sizeof arrays / sizeof *arrays; ++i) {
     void *array;
     memcpy(&array, arrays[i], sizeof array);
@@ -29,6 +31,7 @@ static supine_status reserve(supine_inside_content *content, size_t points, size
     memcpy(arrays[i], &grown, sizeof grown);
   }
   content->names[used] = '\0';
+  memset(content->rigid + content->count, 0, points * sizeof *content->rigid);
   return SUPINE_OK;
 }
 
@@ -105,42 +108,88 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
   return add_surface(name, length, &mesh, content, error);
 }
 
-/* Make the list of rigid parts, unless it exists. */
-static supine_status list_rigid(supine_inside_content *content, supine_error *error) {
-  if (content->rigid == NULL) {
-    content->rigid = calloc(content->part_count + 1, sizeof *content->rigid);
+/* Move the points of a part, which `mesh` has, so that those of each rigid piece follow each other,
+ * and those that deform come last.
+ * @param first  of the points and corners of the part */
+static supine_status sort_pieces(supine_inside_content *content, const supine_mesh *mesh,
+                                 const uint32_t *piece, uint32_t pieces, size_t first,
+                                 uint32_t *corners) {
+  SUPINE_ARENA arena = {0};
+  const size_t n = mesh->vertex_count;
+  double *points = supine_arena_take(&arena, 3 * n, sizeof *points);
+  uint32_t *to = supine_arena_take(&arena, n, sizeof *to); /* new index of each point */
+  uint32_t next = 0;
+  SUPINE_TRY(supine_arena_status(&arena));
+  memcpy(points, mesh->vertices, 3 * n * sizeof *points);
+  for (uint32_t k = 1; k <= pieces + 1; ++k) {
+    for (size_t i = 0; i < n; ++i) {
+      if (piece[i] == k % (pieces + 1)) {
+        const size_t at = first + next;
+        memcpy(content->points + 3 * at, points + 3 * i, 3 * sizeof *points);
+        content->rigid[at] = piece[i] > 0 ? (uint32_t)content->rigid_count + piece[i] : 0;
+        to[i] = next++;
+      }
+    }
   }
-  return content->rigid == NULL ? supine_error_memory(error, "%zu parts", content->part_count)
-                                : SUPINE_OK;
+  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    corners[i] = (uint32_t)first + to[mesh->triangles[i]];
+  }
+  content->rigid_count += pieces;
+  return SUPINE_OK;
+}
+
+/* Make the compact components of a part rigid, which has the points from `begin` to `end` and
+ * `triangle_count` triangles. */
+static supine_status find_pieces(supine_inside_content *content, size_t begin, size_t end,
+                                 uint32_t *triangles, size_t triangle_count) {
+  SUPINE_ARENA arena = {0};
+  supine_mesh mesh = {end - begin, content->points + 3 * begin, triangle_count,
+                      supine_arena_take(&arena, 3 * triangle_count, sizeof *triangles)};
+  uint32_t *piece = supine_arena_take(&arena, end - begin, sizeof *piece);
+  uint32_t pieces = 0;
+  SUPINE_TRY(supine_arena_status(&arena));
+  for (size_t i = 0; i < 3 * triangle_count; ++i) {
+    mesh.triangles[i] = triangles[i] - (uint32_t)begin;
+  }
+  SUPINE_TRY(supine_mesh_find_compact(&mesh, piece, &pieces));
+  if (pieces == 0) {
+    return SUPINE_OK;
+  }
+  return sort_pieces(content, &mesh, piece, pieces, begin, triangles);
 }
 
 supine_status supine_inside_content_find_compact(supine_inside_content *content,
                                                  supine_error *error) {
   size_t first = 0; /* triangle; those of a part follow each other */
-  while (first < content->triangle_count) {
-    const uint32_t part = content->part[content->triangles[3 * first]];
+  for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
     size_t next = first;
-    double volume = 0.0;
-    double covariance[3][3];
-    while (next < content->triangle_count &&
-           content->part[content->triangles[3 * next]] == part) {
+    while (end < content->count && content->part[end] == content->part[begin]) {
+      ++end;
+    }
+    while (next < content->triangle_count && content->triangles[3 * next] < end) {
       ++next;
     }
-    const supine_mesh mesh = {content->count, content->points, next - first,
-                              content->triangles + 3 * first};
-    SUPINE_TRY(supine_mesh_solid(&mesh, &volume, covariance));
-    if (supine_mesh_is_compact(volume, (const double(*)[3])covariance)) {
-      SUPINE_TRY(list_rigid(content, error));
-      content->rigid[part] = true;
+    uint32_t *triangles = content->triangles + 3 * first;
+    if (next > first && find_pieces(content, begin, end, triangles, next - first) != SUPINE_OK) {
+      return supine_error_memory(error, "%zu points", content->count);
     }
     first = next;
   }
   return SUPINE_OK;
 }
 
+/* Make the part of an index a rigid piece. */
+static void make_rigid(supine_inside_content *content, size_t part) {
+  ++content->rigid_count;
+  for (size_t i = 0; i < content->count; ++i) {
+    if (content->part[i] == part) {
+      content->rigid[i] = (uint32_t)content->rigid_count;
+    }
+  }
+}
+
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error) {
-  SUPINE_TRY(list_rigid(content, error));
   for (const char *at = names;; ++at) {
     const size_t length = strcspn(at, ",");
     const char *part = content->names;
@@ -148,7 +197,8 @@ supine_status supine_inside_content_make_rigid(supine_inside_content *content, c
     for (size_t i = 0; i < content->part_count; ++i, part += strcspn(part, "\n") + 1) {
       const bool same = strncmp(part, at, length) == 0 && strchr("\n", part[length]) != NULL;
       if (same || strcmp(names, "all") == 0) {
-        content->rigid[i] = found = true;
+        make_rigid(content, i);
+        found = true;
       }
     }
     SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_ARGUMENT,

@@ -16,7 +16,9 @@ typedef struct supine_inside_content {
   uint32_t *triangles; /**< [triangle_count, 3] indices of points */
   size_t part_count;   /**< number of named points and meshes; 0 for a grid */
   char *names;         /**< names of the parts in order, separated by newlines */
-  bool *rigid;         /**< [part_count] whether the part keeps its shape; NULL if none does */
+  size_t rigid_count;  /**< number of rigid pieces: parts, or components of a part */
+  uint32_t *rigid;     /**< [count] 1 + index of the rigid piece of each point, whose points follow
+                          each other; 0 if the point deforms. Unused for a grid */
   supine_image grid;   /**< for a grid: numbers of nodes, position of the first node, and steps */
 } supine_inside_content;
 
@@ -33,11 +35,12 @@ supine_status supine_inside_content_mesh(const char *path, const supine_mesh_loa
 supine_status supine_inside_content_surface(const char *name, const supine_mesh *mesh,
                                             supine_inside_content *content, supine_error *error);
 
-/** Mark the closed meshes that are compact as rigid (supine_mesh_is_compact). */
+/** Make each compact component of the meshes a rigid piece (supine_mesh_find_compact). Where a mesh
+ * has other components, too, its points are put in another order, the rigid pieces first. */
 supine_status supine_inside_content_find_compact(supine_inside_content *content,
                                                  supine_error *error);
 
-/** Mark further parts as rigid: they move, but keep their shape.
+/** Make further parts rigid pieces: each moves as a whole, but keeps its shape.
  * @param names  part names separated by commas, or "all" */
 supine_status supine_inside_content_make_rigid(supine_inside_content *content, const char *names,
                                                supine_error *error);

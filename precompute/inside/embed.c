@@ -37,7 +37,7 @@ typedef struct embedding {
   uint32_t *part;      /* [points] index of the named point, mesh or grid node of each point */
   unsigned char *group; /* [points] index of the lung of each point */
   uint32_t *triangles;  /* [triangles, 3] indices of vertices */
-  uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid part */
+  uint32_t *rigid;      /* [rigid_count, 2] begin and end of the vertices of each rigid piece */
   size_t rigid_count;
   unsigned char *anatomy; /* [parts] the tensor anatomy */
   double *squares;        /* [lungs, 3, modes, modes] the tensor lungs_squares */
@@ -70,21 +70,20 @@ static size_t end_of_part(const supine_inside_content *content, size_t begin) {
   return end;
 }
 
-/* Assign the points of each rigid part to the lung that holds most of them. */
-static void gather_parts(embedding *e) {
+/* Assign the points of each rigid piece to the lung that holds most of them. */
+static void gather_pieces(embedding *e) {
   const supine_inside_content *content = e->content;
-  if (content->rigid == NULL) {
+  if (content->rigid_count == 0) {
     return;
   }
   for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
     size_t count[SUPINE_LUNGS_MAX] = {0};
     size_t most = 0;
-    end = end_of_part(content, begin);
-    for (size_t i = begin; i < end; ++i) {
-      const size_t lung = e->lung[i];
+    while (end < content->count && content->rigid[end] == content->rigid[begin]) {
+      const size_t lung = e->lung[end++];
       most = ++count[lung] > count[most] ? lung : most;
     }
-    if (content->rigid[content->part[begin]]) {
+    if (content->rigid[begin] > 0) {
       for (size_t i = begin; i < end; ++i) {
         e->lung[i] = (unsigned char)most;
         e->place[i] = supine_lungs_surface_find(e->shells->shell[most].surface,
@@ -181,13 +180,14 @@ static void check_belonging(const embedding *e, supine_findings *findings) {
                                   findings);
 }
 
-/* List the ranges of points that belong to one rigid part. */
+/* List the ranges of points that belong to one rigid piece. */
 static void list_rigid(embedding *e, size_t n) {
+  const uint32_t *rigid = e->content->rigid;
   for (size_t begin = 0, end = 0; begin < n; begin = end) {
-    while (end < n && e->part[end] == e->part[begin]) {
+    while (end < n && rigid[e->order[end]] == rigid[e->order[begin]]) {
       ++end;
     }
-    if (e->content->rigid[e->part[begin]] && end > begin + 1) {
+    if (rigid[e->order[begin]] > 0 && end > begin + 1) {
       e->rigid[2 * e->rigid_count] = (uint32_t)begin;
       e->rigid[2 * e->rigid_count++ + 1] = (uint32_t)end;
     }
@@ -224,7 +224,7 @@ static supine_status sort_points(embedding *e, supine_inside_report *report, sup
   for (size_t i = 0; i < 3 * e->content->triangle_count; ++i) {
     e->triangles[i] = position[e->content->triangles[i]];
   }
-  if (e->content->rigid != NULL) {
+  if (e->content->rigid_count > 0) {
     list_rigid(e, n);
   }
   report->count = n;
@@ -616,7 +616,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       .group = supine_arena_take(&arena, n, 1),
       .error_share = supine_arena_take(&arena, n, sizeof *e.error_share),
       .triangles = supine_arena_take(&arena, 3 * content->triangle_count, sizeof *e.triangles),
-      .rigid = supine_arena_take(&arena, 2 * content->part_count, sizeof *e.rigid),
+      .rigid = supine_arena_take(&arena, 2 * content->rigid_count, sizeof *e.rigid),
       .anatomy = supine_arena_take(&arena, content->part_count, 1),
       .hilum = supine_arena_take(&arena, shells->count * columns, sizeof *e.hilum),
       .squares = supine_arena_zeros(&arena, shells->count * columns * columns, sizeof *e.squares)};
@@ -624,7 +624,7 @@ supine_status supine_inside_embed(const supine_inside_shells *shells,
       supine_arena_check(&arena, error, "%zu points, each with %zu coefficients", n, columns));
   supine_parallel_for(n, GRAIN, 0, find_places, &e);
   check_belonging(&e, &report->findings); /* before rigid parts are counted as of one lung */
-  gather_parts(&e);
+  gather_pieces(&e);
   SUPINE_TRY(check_distance(&e, error));
   SUPINE_TRY(supine_inside_anatomy(shells, content, e.anatomy, error));
   SUPINE_TRY(sort_points(&e, report, error));

@@ -16,7 +16,7 @@
  *
  * So points on the surface move exactly with the surface.
  *
- * A rigid part belongs to the lung with most of its vertices (runtime/rigid.h).
+ * A rigid piece belongs to the lung with most of its vertices (runtime/rigid.h).
  *
  * Positions x are given in the scan. The new basis stores positions at full inflation, like the
  * basis of the surface: x minus the displacement u(x) in the scan. */
@@ -53,20 +53,20 @@ typedef struct supine_inside_report {
   size_t count;                     /**< number of embedded points */
   size_t in_lung[SUPINE_LUNGS_MAX]; /**< number of points that move with each lung */
   size_t outside;                   /**< number of points outside every lung */
-  size_t farthest;    /**< index of the outside point that is farthest from the lungs */
-  double farthest_mm; /**< distance of the farthest outside point from the lungs, mm */
-  size_t rigid;       /**< number of rigid parts of more than one vertex */
+  size_t farthest;          /**< index of the outside point that is farthest from the lungs */
+  double farthest_mm;       /**< distance of the farthest outside point from the lungs, mm */
+  size_t rigid;             /**< number of rigid pieces of more than one vertex */
   supine_findings findings; /**< warnings about parts that hardly belong to these lungs */
 } supine_inside_report;
 
 /** Embed the points of `content` in the lungs, and write them as a new basis file. The file has
- * these additional tensors, for N points and R rigid meshes:
+ * these additional tensors, for N points and R rigid pieces:
  *
  *     part       U32 [N]     index of the named point or mesh; in a grid, index of the grid node
  *     depth      F32 [N]     mm below the surface in the scan, negative outside
  *     names      U8 [bytes]  names of points and meshes, separated by newlines (not for a grid)
  *     anatomy    U8 [parts]  1: airways, a lobe, ...; 0: a target (anatomy.h; not for a grid)
- *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid mesh (if there are any)
+ *     rigid      U32 [R, 2]  vertices begin <= i < end of each rigid piece (if there are any)
  *     grid       F64 [4, 3]  position of the first node, then the three steps, mm (for a grid)
  *     grid_size  U32 [3]     number of nodes along the three steps (for a grid)
  *     lungs_box  F64 [2, 3]  corners of the box around the lungs' surface, mm

@@ -67,8 +67,8 @@ static const supine_option table[] = {
      .wants =
          "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
     {"rigid", 0, "all|NAME,...",
-     "further parts that keep their size and shape and rotate with the tissue. Compact parts of 1 "
-     "to 30 mL, such as nodules and tumours, always do; other parts deform",
+     "further parts that keep their size and shape and rotate with the tissue. Compact components "
+     "of a part, of 1 to 30 mL, such as nodules and tumours, always do; others deform",
      SUPINE_FILLS(request, rigid)},
     {"clamp", 0, NULL,
      "move structures outside the lungs like the nearest point of the surface; by default the "

@@ -88,7 +88,7 @@ static size_t find(const supine_field *field, shape which, bool ct, double volum
 
 /* A tumour has one volume, whether a CT or a label map shows it. */
 TEST(test_tissue_find_tumours_same_volume_in_ct_and_labels) {
-  static const char *const names[SHAPES] = {"ball",   "hollow", "irregular",
+  static const char *const names[SHAPES] = {"ball",    "hollow", "irregular",
                                             "pleural", "vessel", "lobe"};
   supine_field field = ball_field();
   for (shape which = BALL; which < SHAPES; ++which) {
@@ -123,21 +123,51 @@ static supine_mesh box(const double half[3], const double centre[3], bool inward
   return mesh;
 }
 
-/* Compact closed meshes are rigid; long, large and open ones are not. */
-TEST(test_content_find_compact_only_compact_closed_meshes_rigid) {
-  static const double halves[4][3] = {{8, 9, 7}, {4, 4, 40}, {20, 25, 22}, {8, 9, 7}};
-  static const double centre[3] = {61.0, -17.0, 25.0};
+/* Append a mesh to another, and free it. */
+static void join(supine_mesh *mesh, supine_mesh other) {
+  const size_t n = mesh->vertex_count;
+  const size_t t = mesh->triangle_count;
+  mesh->vertices = realloc(mesh->vertices, 3 * (n + other.vertex_count) * sizeof(double));
+  mesh->triangles = realloc(mesh->triangles, 3 * (t + other.triangle_count) * sizeof(uint32_t));
+  memcpy(mesh->vertices + 3 * n, other.vertices, 3 * other.vertex_count * sizeof(double));
+  for (size_t i = 0; i < 3 * other.triangle_count; ++i) {
+    mesh->triangles[3 * t + i] = other.triangles[i] + (uint32_t)n;
+  }
+  mesh->vertex_count += other.vertex_count;
+  mesh->triangle_count += other.triangle_count;
+  supine_mesh_free(&other);
+}
+
+/* Compact closed components are rigid, with the cavities in them and beside stray ones; long, large
+ * and open ones are not. */
+TEST(test_content_find_compact_only_compact_closed_components_rigid) {
+  static const double halves[6][3] = {{8, 9, 7}, {4, 4, 40}, {20, 25, 22},
+                                      {8, 9, 7}, {8, 9, 7},  {1, 1, 1}};
+  static const double centre[2][3] = {{61.0, -17.0, 25.0}, {21.0, -31.0, 11.0}};
   supine_inside_content content = {.count = 0};
   for (size_t i = 0; i < 4; ++i) {
-    supine_mesh mesh = box(halves[i], centre, false);
+    supine_mesh mesh = box(halves[i], centre[0], false);
     mesh.triangle_count -= i == 3 ? 1 : 0; /* open */
     assert_int_equal(supine_inside_content_surface((const char *[]){"a", "b", "c", "d"}[i], &mesh,
                                                    &content, NULL),
                      SUPINE_OK);
     supine_mesh_free(&mesh);
   }
+  supine_mesh mesh = box(halves[5], centre[1], false); /* a stray voxel, a tumour and its cavity */
+  join(&mesh, box(halves[4], centre[0], false));
+  join(&mesh, box((const double[]){3, 4, 2}, centre[0], true));
+  assert_int_equal(supine_inside_content_surface("e", &mesh, &content, NULL), SUPINE_OK);
   assert_int_equal(supine_inside_content_find_compact(&content, NULL), SUPINE_OK);
-  assert_non_null(content.rigid);
-  assert_true(content.rigid[0] && !content.rigid[1] && !content.rigid[2] && !content.rigid[3]);
+  assert_int_equal(content.rigid_count, 2);
+  for (size_t i = 0; i < content.count; ++i) {
+    const uint32_t of_box[7] = {1, 0, 0, 0, 2, 2, 0}; /* the stray voxel comes last */
+    assert_int_equal(content.rigid[i], of_box[i / 8]);
+  }
+  const supine_mesh moved = {24, content.points + 96, 36, mesh.triangles};
+  for (size_t i = 0; i < 108; ++i) {
+    mesh.triangles[i] = content.triangles[content.triangle_count * 3 - 108 + i] - 32;
+  }
+  assert_close(supine_mesh_volume(&moved), 8 * (8 * 9 * 7 + 1 - 3 * 4 * 2), 1e-9);
+  supine_mesh_free(&mesh);
   supine_inside_content_free(&content);
 }

@@ -4,7 +4,8 @@ embedded surfaces in the command and in Python. All give one volume within 5 %, 
 
     test_tumours.py SUPINE SOURCE LIBRARY
 
-The tumours are a ball, one with a cavity, an irregular one, and one at the pleura, in the lungs of examples/lungs."""
+The tumours are a ball, one with a cavity, an irregular one, one at the pleura, and one whose label has stray voxels, in
+the lungs of examples/lungs."""
 import glob
 import json
 import os
@@ -24,8 +25,8 @@ except ImportError:
 program, source, library = map(os.path.abspath, sys.argv[1:4])
 STEP = 1.6  # mm
 STATE = "prone:rest"
-NAMES = {3: "ball", 4: "hollow", 5: "irregular", 6: "pleural"}
-SIDE = {3: 1, 4: 1, 5: 2, 6: 2}  # lungs in the label map: 1 left, 2 right
+NAMES = {3: "ball", 4: "hollow", 5: "irregular", 6: "pleural", 7: "with stray voxels"}
+SIDE = {3: 1, 4: 1, 5: 2, 6: 2, 7: 1}  # lungs in the label map: 1 left, 2 right
 SOFT, AERATED = 30.0, -850.0  # HU
 
 
@@ -77,6 +78,10 @@ def place(labels, coarse, step):
         if side == 1:
             labels[ball(labels, low, 11)] = 3
             labels[ball(labels, high, 12) & ~ball(labels, high, 6)] = 4
+            middle = index[np.abs(index[:, 2] - (low[2] + high[2]) / 2).argmin()]
+            labels[ball(labels, middle, 11)] = 7
+            for away in np.random.default_rng(3).choice([-1, 1], (8, 3)) * np.arange(10, 16, 0.75)[:, None]:
+                labels[tuple(np.rint((middle + away) / STEP).astype(int))] = 7
             continue
         shape = ball(labels, low, 10)
         for way in ([9, 4, 0], [-3, 8, 5], [0, -6, -8]):
@@ -104,6 +109,12 @@ def in_image(name, map_name):
         shell = ndimage.binary_dilation(own, iterations=6) & ~near & (labels[box] == SIDE[part])
         found[part] = (near & lung & (values > (SOFT + np.median(values[shell])) / 2)).sum() * STEP ** 3 / 1000
     return found
+
+
+def strays(name):
+    """Return the number of stray voxels of the tumour that has some: those that are not of its largest component."""
+    pieces, count = ndimage.label(read(name) == 7)
+    return (pieces > 0).sum() - max((pieces == i).sum() for i in range(1, count + 1))
 
 
 def mass(ct, labels):
@@ -164,6 +175,10 @@ def main():
         print(f"{name}: " + ", ".join(f"{road[part]:.2f} mL ({of})" for of, road in roads.items()))
         if not max(volumes) < 1.05 * min(volumes):
             faults.append(f"{name}: {min(volumes):.2f} to {max(volumes):.2f} mL")
+    left = [strays(name) for name in ("labels.nii", "b.nii", "d.nii")]
+    print(f"stray voxels: {left[0]} in the scan, {left[1]} and {left[2]} at rest")
+    if min(left) == 0:
+        faults.append("stray voxels vanish")
     before = mass(ct, labels)
     for output, of in (("a", "d"), ("c", "d")):
         change = mass(read(output + ".nii"), read(of + ".nii")) / before - 1
