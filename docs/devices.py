@@ -94,7 +94,10 @@ def page(folder):
              "to be wrong, and how each promise is tested. This page is generated from the pages and tests it names.",
              "", "A release states what its files contain and depend on, with versions and licences, in",
              "`supine-VERSION-binaries.spdx.json` (SPDX 2.3) and `.cdx.json` (CycloneDX 1.5), and the licences of its",
-             "sources in `supine-VERSION.spdx`.", "", "## Known anomalies", "", "### The model", "",
+             "sources in `supine-VERSION.spdx`. The library of CycloneDX validates the second; no validator of SPDX",
+             "was at hand for the first, of which a test compares every file, version and licence with the release.",
+             "",
+             "## Known anomalies", "", "### The model", "",
              "[Limits](guide/limits.md) has the measurements.", ""]
     lines += [f"- **{name}.** {plain(text)}" for name, text in sources.limits()]
     lines += ["", "### Mistakes in inputs that are taken without a word", "",
