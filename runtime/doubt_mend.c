@@ -12,6 +12,7 @@
 
 #include "base/vec3.h"
 #include "runtime/doubt.h"
+#include "runtime/doubt_volume.h"
 #include "runtime/internal.h"
 
 enum {
@@ -43,6 +44,7 @@ typedef struct covariation {
 
 struct supine_doubt_mend {
   const supine_doubt *doubt;
+  supine_doubt_shape shape;
   size_t lungs, vertices; /* lungs whose volumes are held: none if points decided their volume */
   double volume[SUPINE_LUNGS_MAX];                    /* predicted, mm^3 */
   double factor[SUPINE_LUNGS_MAX * SUPINE_LUNGS_MAX]; /* Cholesky factor of g' C g */
@@ -56,57 +58,7 @@ size_t supine_doubt_mend_space(const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t floats = 3 * info->vertex_count * (2 + info->lung_count);
   const size_t bytes = sizeof(supine_doubt_mend) + CELLS * sizeof(cell) + floats * sizeof(float);
-  return (bytes + sizeof(double) - 1) / sizeof(double);
-}
-
-/* Return the lung of a triangle. */
-static size_t lung_of(const supine_basis_info *info, const uint32_t *triangle) {
-  size_t lung = 0;
-  while (triangle[0] >= info->lung_begin[lung + 1]) {
-    ++lung;
-  }
-  return lung;
-}
-
-/* Compute the vector area of a triangle, times 2. */
-static void find_area(const float *xyz, const uint32_t *triangle, double area[3]) {
-  double side[2][3];
-  for (size_t k = 0; k < 6; ++k) {
-    side[k / 3][k % 3] =
-        (double)xyz[3 * triangle[1 + k / 3] + k % 3] - (double)xyz[3 * triangle[0] + k % 3];
-  }
-  supine_cross(side[0], side[1], area);
-}
-
-/* Compute the volume of each lung, mm^3. */
-static void find_volumes(const supine_basis *basis, const float *xyz, double *volume) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const uint32_t *triangle = supine_basis_triangles(basis);
-  memset(volume, 0, info->lung_count * sizeof *volume);
-  for (size_t t = 0; t < info->triangle_count; ++t, triangle += 3) {
-    const float *corner = xyz + 3 * (size_t)triangle[0];
-    double area[3];
-    find_area(xyz, triangle, area);
-    const size_t lung = lung_of(info, triangle);
-    for (size_t k = 0; k < 3; ++k) { /* relative to the first vertex of the lung, for precision */
-      const double from = (double)xyz[3 * info->lung_begin[lung] + k];
-      volume[lung] += area[k] * ((double)corner[k] - from) / 6;
-    }
-  }
-}
-
-/* Compute the change of a lung's volume with each of its vertices. */
-static void find_gradient(const supine_basis *basis, const float *xyz, float *gradient) {
-  const supine_basis_info *info = supine_basis_get_info(basis);
-  const uint32_t *triangle = supine_basis_triangles(basis);
-  memset(gradient, 0, 3 * info->vertex_count * sizeof *gradient);
-  for (size_t t = 0; t < info->triangle_count; ++t, triangle += 3) {
-    double area[3];
-    find_area(xyz, triangle, area);
-    for (size_t e = 0; e < 9; ++e) {
-      gradient[3 * (size_t)triangle[e / 3] + e % 3] += (float)(area[e % 3] / 6);
-    }
-  }
+  return (bytes + sizeof(double) - 1) / sizeof(double) + supine_doubt_shape_space(basis);
 }
 
 /* Return the index of the cell of a vertex in the box of its lung. */
@@ -265,7 +217,7 @@ static void predict(supine_doubt_mend *m, size_t state) {
   const supine_doubt *d = m->doubt;
   const supine_basis_info *info = supine_basis_get_info(d->basis);
   (void)supine_deform(d->basis, &d->model[state].pose[EXPECTED_AT], m->predicted);
-  find_volumes(d->basis, m->predicted, m->volume);
+  supine_doubt_shape_volumes(&m->shape, m->predicted, m->volume, NULL);
   if (d->location != NULL) {
     const double none[DOUBT_VECTORS] = {0};
     memset(m->predicted, 0, 3 * m->vertices * sizeof *m->predicted);
@@ -285,17 +237,24 @@ supine_status supine_doubt_mend_prepare(const supine_doubt *doubt, size_t state,
     return supine_error_set(error, SUPINE_ERROR_ARGUMENT, "state %zu: give one below %zu", state,
                             doubt->state_count);
   }
-  if (!info->has_volume || supine_basis_metadata(doubt->basis, "content") != NULL) {
+  supine_doubt_shape shape;
+  const bool closed = supine_doubt_shape_prepare(doubt->basis,
+                                                 space + supine_doubt_mend_space(doubt->basis) -
+                                                     supine_doubt_shape_space(doubt->basis),
+                                                 &shape);
+  if (!info->has_volume || !closed) {
     return SUPINE_OK;
   }
   const bool held = doubt->location == NULL || !doubt->location->options.volume;
-  *m = (supine_doubt_mend){.doubt = doubt, .lungs = held ? info->lung_count : 0, .vertices = n};
+  *m = (supine_doubt_mend){
+      .doubt = doubt, .shape = shape, .lungs = held ? info->lung_count : 0, .vertices = n};
   m->cells = (cell *)(m + 1);
   m->predicted = (float *)(m->cells + CELLS);
   m->gradient = m->predicted + 3 * n;
   m->along = m->gradient + 3 * n;
   predict(m, state);
-  find_gradient(doubt->basis, m->predicted, m->gradient);
+  double volume[SUPINE_LUNGS_MAX];
+  supine_doubt_shape_volumes(&m->shape, m->predicted, volume, m->gradient);
   for (size_t lung = 0; lung < m->lungs; ++lung) {
     find_along(m, state, lung, m->factor + m->lungs * lung);
   }
@@ -319,9 +278,9 @@ static bool is_turned(const supine_doubt_mend *m, const float *xyz, const uint32
   double reference[3];
   double before[3];
   double now[3];
-  find_area(supine_basis_vertices(m->doubt->basis), triangle, reference);
-  find_area(m->predicted, triangle, before);
-  find_area(xyz, triangle, now);
+  supine_doubt_area(supine_basis_vertices(m->doubt->basis), triangle, reference);
+  supine_doubt_area(m->predicted, triangle, before);
+  supine_doubt_area(xyz, triangle, now);
   return !(supine_dot(before, now) > 0) ||
          (supine_dot(reference, before) > 0 && !(supine_dot(reference, now) > 0));
 }
@@ -330,7 +289,7 @@ static bool is_turned(const supine_doubt_mend *m, const float *xyz, const uint32
 static bool repair(const supine_doubt_mend *m, float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(m->doubt->basis);
   const uint32_t *triangle = supine_basis_triangles(m->doubt->basis);
-  bool turned = false;
+  bool turned = supine_doubt_shape_unfold(&m->shape, m->predicted, xyz);
   for (size_t t = 0; t < info->triangle_count; ++t, triangle += 3) {
     if (!is_turned(m, xyz, triangle)) {
       continue;
@@ -356,7 +315,7 @@ static bool hold_volumes(const supine_doubt_mend *m, float *xyz) {
   for (int step = 0; step < VOLUME_STEPS; ++step) {
     double away[SUPINE_LUNGS_MAX];
     double most = 0;
-    find_volumes(m->doubt->basis, xyz, away);
+    supine_doubt_shape_volumes(&m->shape, xyz, away, NULL);
     for (size_t lung = 0; lung < m->lungs; ++lung) {
       away[lung] -= m->volume[lung];
       most = fmax(most, fabs(away[lung]));

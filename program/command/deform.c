@@ -61,8 +61,9 @@ static const supine_option table[] = {
     {"samples", 0, "N",
      "write N plausible lungs to -o FILE.safetensors instead of the computed one: all vertices, "
      "positions [N, vertices, 3] in mm and LPS. They are drawn from the expected error, points "
-     "near each other with errors alike, and every sample of a surface has the volumes of the "
-     "state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % sure. "
+     "near each other with errors alike, and every sample of a surface or a grid has the volumes "
+     "of "
+     "the state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % sure. "
      "Samples of points inside the lungs have no surface, and their volumes are not exact. "
      "Embedded points are in the order in which they were embedded. Equal options make equal "
      "files",

@@ -309,6 +309,31 @@ moved, dense = (grid.warp(image, ["prone:rest", "left:rest+300"], **frame, densi
 assert all(m.shape == image.shape and m.dtype == np.int16 and (m != image).any() for m in moved)
 assert (moved[0] != moved[1]).any() and (dense[0] > moved[0]).any()
 assert (supine.open(open("grid.safetensors", "rb").read()).warp(image, "prone:rest", **frame) == moved[0]).all()
+# Samples of a grid hold the volumes: the Jacobians at the centres of its cells, times their share in the lungs, have
+# the sum that they have in the prediction.
+def volumes_of(xyz):
+    """Return the volume of a grid's cells in the lungs, mL, by the Jacobian at their centres."""
+    places = np.full((np.prod(grid.tensor("grid_size")), 3), np.nan)
+    deep = np.full(len(places), np.nan)
+    places[grid.tensor("part")], deep[grid.tensor("part")] = xyz, grid.tensor("depth")
+    shape = tuple(grid.tensor("grid_size")[::-1])
+    places, deep = places.reshape(*shape, 3), deep.reshape(shape)
+    edges = [np.diff(places, axis=a) for a in (2, 1, 0)]
+    for a, edge in zip((2, 1, 0), edges):
+        for other in {0, 1, 2} - {a}:
+            last = edge.shape[other] - 1
+            edge = (np.take(edge, range(1, last + 1), other) + np.take(edge, range(last), other)) / 2
+        edges[2 - a] = edge
+    corners = np.stack([deep[i:shape[0] - 1 + i, j:shape[1] - 1 + j, k:shape[2] - 1 + k]
+                        for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    share = np.clip(0.5 + corners.mean(0) / (corners.max(0) - corners.min(0)), 0, 1)
+    share = np.where(corners.min(0) >= 0, 1, np.where(corners.max(0) <= 0, 0, share))
+    return np.nansum(share * np.einsum("...i,...i", edges[0], np.cross(edges[1], edges[2]))) / 1000
+
+
+held = volumes_of(grid.deform(grid.pose("prone:rest")))
+for drawn in grid.samples("prone:rest", 3, seed=2):
+    assert abs(volumes_of(drawn) / held - 1) < 1e-3, (volumes_of(drawn), held)
 turned = grid.warp(image.astype(">f8")[:, :, ::-1], "prone:rest", step=np.diag([-6, 7, 8]),
                    origin=low + [6 * (size[0] - 1), 0, 0])
 assert abs(turned[:, :, ::-1] - moved[0]).max() < 0.51

@@ -162,8 +162,9 @@ SUPINE_API size_t supine_doubt_mend_space(const supine_basis *basis);
 /** Prepare the mending of samples of one state of a field: find how the error of every vertex
  * covaries with the volumes. Cost: some hundred evaluations of the kernel for each vertex and lung.
  * @param space  [supine_doubt_mend_space(basis)]; keep it as long as `mend` is used
- * @param mend   written; NULL after a failure, and where there is nothing to mend: the basis has no
- *               closed surface of the lungs, or their error is 0, as in the state of the scan
+ * @param mend   written; NULL after a failure, and where there is nothing to mend: the basis has
+ *               neither a closed surface of the lungs nor a grid in them, or their error is 0, as
+ * in the state of the scan
  * @retval SUPINE_ERROR_ARGUMENT  the state is out of range */
 SUPINE_API supine_status supine_doubt_mend_prepare(const supine_doubt *doubt, size_t state,
                                                    double *space, const supine_doubt_mend **mend,

@@ -459,9 +459,9 @@ class Basis:
     def samples(self, state: Gravity, count: int, seed: int = 0, since: Optional[Gravity] = None, *,
                 another_day: bool = False) -> Floats:
         """Draw `count` plausible lungs around those computed for a state: positions [count, N, 3], mm. Their spread is
-        the expected error, before the best translation is taken out (a factor of 1.15). Lungs have the volumes of the
-        state and no folds; points inside them have no surface, and keep no volume. `seed` and the place in the array
-        decide a sample. The numbers are those of `supine deform --samples`."""
+        the expected error, before the best translation is taken out (a factor of 1.15). Lungs, and grids in
+        them, have the volumes of the state and no folds; points inside them have no surface, and keep no volume. `seed`
+        and the place in the array decide a sample. The numbers are those of `supine deform --samples`."""
         field, _space = self._doubt([state], since, another_day)
         return self._samples(field, count, seed)
 
