@@ -195,6 +195,15 @@ def imaged(voxels, *words, shift=0.0):
     return {"command": run}
 
 
+def labelled(voxels):
+    """A label map that moves with the lungs."""
+    def run():
+        write_nrrd("map.nrrd", voxels, frame[0])
+        return command("deform", "grid.safetensors", "--posture", "prone:rest", "--labels", "map.nrrd", "-o",
+                       "moved.nrrd")
+    return {"command": run}
+
+
 def speckled(voxels):
     """Replace every twelfth voxel of the lungs by soft tissue."""
     voxels = voxels.copy()
@@ -298,6 +307,7 @@ CASES = {
     "lungs-level": (lambda: made("lungs.ply"), lambda: made("apart.ply"), "told"),
     "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
     "image-frame": (lambda: imaged(ct), lambda: imaged(ct, shift=900.0), "told"),
+    "labels-lungs": (lambda: labelled(sides), lambda: labelled(sides[:, :, ::-1]), "told"),
     "image-labels": (lambda: imaged(ct), lambda: imaged(sides.astype(ct.dtype)), "told"),
     "ct-frame": (lambda: imaged(ct, "--density"), lambda: imaged(ct, "--density", shift=900.0), "refused"),
     "ct-air": (lambda: imaged(ct, "--density"), lambda: imaged(-ct - 810, "--density"), "refused"),

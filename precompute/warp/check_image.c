@@ -16,6 +16,11 @@
 static const double rim = 3.0;
 /* Voxels of labels may lie so far outside the lungs, mm: the basis may have coarse surfaces. */
 static const double label_rim = 15.0;
+/* If the labels of a map fill this share of the lungs, it shows the lungs, but not all of these.
+ * Its labels are then judged together, and may lie outside by less, mm. */
+static const double shown_least = 0.6;
+static const double shown_most = 0.96;
+static const double lung_rim = 10.0;
 /* A label of which less than this share lies in the lungs does not belong to them. */
 static const double label_inside = 1.0 / 3.0;
 /* Collapsed and consolidated tissue, and that outside the lungs, is above this density, HU. */
@@ -26,6 +31,7 @@ enum { LABELS = 65536 };
 typedef struct sight {
   size_t nodes;             /* number of nodes inside the lungs */
   supine_lungs_belong lung; /* the nodes that lie in the image; outside: those without air */
+  size_t filled;            /* number of nodes at which the image is above 0 */
   double low[3], high[3];   /* box of the nodes, mm */
   double first[3], last[3]; /* box of the image, mm */
 } sight;
@@ -74,6 +80,7 @@ static void look_at_nodes(const supine_image *depth, const supine_image *image, 
     ++s->nodes;
     if (look(image, point, &value)) {
       supine_lungs_belong_add(&s->lung, value < airless ? 1.0 : -1.0);
+      s->filled += value > 0.0;
     }
   }
   find_image_box(image, s);
@@ -107,13 +114,44 @@ static supine_input_verdict describe(const sight *s, bool ct, bool scaled, char 
   return verdict;
 }
 
-/* Warn of labels that lie in the lungs mostly, but far outside in part, as another person's do. */
+/* What is found of a label. */
+typedef struct labelled {
+  supine_lungs_belong far, near; /* its voxels, with the wide and the narrow rim */
+  size_t inside;                 /* number of voxels inside the lungs */
+} labelled;
+
+/* Warn of labels that lie in the lungs mostly, but far outside in part, as another person's do. A
+ * mirrored map of the lungs differs by less, and leaves a part of the lungs empty. */
+static void judge_labels(const labelled *found, const sight *s, const char *path,
+                         supine_findings *findings) {
+  supine_lungs_belong all = {.rim = lung_rim};
+  bool taken = true;
+  char text[320];
+  for (size_t label = 1; label < LABELS; ++label) {
+    const supine_lungs_belong *near = &found[label].near;
+    if ((double)found[label].inside > label_inside * (double)near->count) {
+      (void)snprintf(text, sizeof text, "voxels of label %zu in %.256s", label, path);
+      taken = supine_lungs_belong_judge(&found[label].far, SUPINE_INPUT_CONTENT_OUTSIDE, text,
+                                        "basis", findings) == SUPINE_INPUT_TAKEN &&
+              taken;
+      all.count += near->count;
+      all.outside += near->outside;
+      all.farthest = fmax(all.farthest, near->farthest);
+    }
+  }
+  const double filled = (double)s->filled / (double)s->nodes;
+  if (taken && filled > shown_least && filled < shown_most) {
+    (void)snprintf(text, sizeof text, "voxels of the lungs in %.256s", path);
+    (void)supine_lungs_belong_judge(&all, SUPINE_INPUT_LABELS_LUNGS, text, "basis", findings);
+  }
+}
+
+/* Find what each label is, and judge it. */
 static supine_status check_labels(const supine_field *field, const supine_image *image,
                                   const sight *s, const char *path, supine_findings *findings,
                                   supine_error *error) {
   SUPINE_ARENA arena = {0};
-  supine_lungs_belong *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
-  size_t *inside = supine_arena_zeros(&arena, LABELS, sizeof *inside);
+  labelled *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
   SUPINE_TRY(supine_arena_check(&arena, error, "%d labels", (int)LABELS));
   for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
     const double label = supine_image_get(image, i);
@@ -134,18 +172,14 @@ static supine_status check_labels(const supine_field *field, const supine_image 
       supine_warp_find_cell(&field->depth, point, &cell);
       supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
     }
-    found[(size_t)label].rim = label_rim;
-    supine_lungs_belong_add(&found[(size_t)label], depth);
-    inside[(size_t)label] += depth >= 0.0;
+    labelled *here = &found[(size_t)label];
+    here->far.rim = label_rim;
+    here->near.rim = lung_rim;
+    supine_lungs_belong_add(&here->far, depth);
+    supine_lungs_belong_add(&here->near, depth);
+    here->inside += depth >= 0.0;
   }
-  for (size_t label = 1; label < LABELS; ++label) {
-    char text[320];
-    (void)snprintf(text, sizeof text, "voxels of label %zu in %.256s", label, path);
-    if ((double)inside[label] > label_inside * (double)found[label].count) {
-      (void)supine_lungs_belong_judge(&found[label], SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis",
-                                      findings);
-    }
-  }
+  judge_labels(found, s, path, findings);
   return SUPINE_OK;
 }
 

@@ -58,6 +58,7 @@ typedef enum supine_input_id {
   SUPINE_INPUT_IMAGE_FRAME,
   SUPINE_INPUT_CT_FRAME,
   SUPINE_INPUT_IMAGE_LABELS,
+  SUPINE_INPUT_LABELS_LUNGS,
   SUPINE_INPUT_CT_AIR,
   SUPINE_INPUT_CT_SOFT,
   /* Two scans of one person, in one posture. */
