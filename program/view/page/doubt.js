@@ -35,7 +35,7 @@ function takeSample(now) {
   const index = stays ? doubt.index : (doubt.index + 1) % SAMPLES;
   const shift = (doubt.kept[index] ??= drawSample(index));
   const changes = shift !== doubt.shift;
-  Object.assign(doubt, { index, shift, since: now });
+  Object.assign(doubt, { index, shift, since: performance.now() }); // a large surface takes a while to draw
   return changes;
 }
 
