@@ -207,16 +207,12 @@ MISTAKES = {
         "mirror": with_part(label, values=label["values"][:, :, ::-1]), "swapped": with_part(label, codes=LIVER),
         "shifted": with_part(label, shift=1.0), "repeated": with_part(label, also=2), "cut": None}),
     "parts": (write_segmentation, ".dcm", {  # of what moves with the lungs
-        RIGHT: label, "unit": with_part(label, step=label["step"] / 1000, origin=label["origin"] / 1000),
-        "axes": with_part(label, origin=label["origin"] * RAS, step=label["step"] * RAS),
-        "person": with_part(label, step=label["step"] * [0.8, 0.7, 0.9]),
+        RIGHT: label, "person": with_part(label, step=label["step"] * [0.8, 0.7, 0.9]),
         "swapped": with_part(label, origin=label["origin"] + [0, 0, 400], codes=LIVER),
         "shifted": with_part(label, shift=1.0), "repeated": with_part(label, also=2), "cut": None}),
     "dose": (write_nifti, ".nii.gz", {
-        RIGHT: dose, "unit": with_part(dose, step=dose["step"] / 1000, origin=dose["origin"] / 1000),
-        "axes": with_part(dose, origin=dose["origin"] * RAS, step=dose["step"] * RAS),
+        RIGHT: dose, "axes": with_part(dose, origin=dose["origin"] * RAS, step=dose["step"] * RAS),
         "shifted": with_part(dose, origin=dose["origin"] + [0, 0, 400]),
-        "range": with_part(dose, values=-dose["values"]),
         "finite": with_part(dose, values=dose["values"] * np.float32(np.nan)), "cut": None}),
     "image": (write_image, ".nrrd", {
         RIGHT: ct, "unit": with_part(ct, values=(ct["values"] + 1000).astype(np.int16)),
