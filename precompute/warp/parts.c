@@ -17,9 +17,10 @@ static const double opening = 3.0;
 enum { OUTLINE = 2000 };
 
 typedef struct search {
-  const supine_image *frame;  /* size and frame of the voxels */
-  unsigned char *stage;       /* [voxels] stage of the search in the upper bits */
-  bool named;                 /* whether every component is a part, whatever its shape */
+  const supine_image *frame;    /* size and frame of the voxels */
+  unsigned char *stage;         /* [voxels] stage of the search in the upper bits */
+  const supine_warp_span *span; /* [rows] where voxels may be soft */
+  bool named;                   /* whether every component is a part, whatever its shape */
   const supine_image *labels; /* a component has voxels of one label; NULL if it has open voxels */
   double label;
   size_t *list; /* the voxels of the component */
@@ -107,14 +108,17 @@ static supine_status open_by_ball(const search *s, supine_error *error) {
     return supine_error_memory(error, "a ball of voxels");
   }
   const size_t *size = s->frame->size;
-  const size_t count = size[0] * size[1] * size[2];
-  for (int open = 0; open < 2; ++open) {
-    const unsigned wanted = open == 0 ? SUPINE_TISSUE_SOFT : SUPINE_TISSUE_CORE;
-    for (size_t i = 0; i < count; ++i) {
-      if (has_stage(s->stage[i], wanted)) {
-        const size_t at[3] = {i % size[0], i / size[0] % size[1], i / size[0] / size[1]};
-        if (ball_visit(s, &b, at, open != 0) && open == 0) {
-          set_stage(&s->stage[i], SUPINE_TISSUE_CORE);
+  const size_t rows = size[1] * size[2];
+  for (size_t row = 0; row < 2 * rows; ++row) { /* twice: to find the balls, and what is in them */
+    const bool open = row >= rows;
+    const unsigned wanted = open ? SUPINE_TISSUE_CORE : SUPINE_TISSUE_SOFT;
+    const supine_warp_span *span = &s->span[row % rows];
+    unsigned char *stage = s->stage + size[0] * (row % rows);
+    for (size_t i = span->begin; i < span->end; ++i) {
+      if (has_stage(stage[i], wanted)) {
+        const size_t at[3] = {i, row % size[1], row % rows / size[1]};
+        if (ball_visit(s, &b, at, open) && !open) {
+          set_stage(&stage[i], SUPINE_TISSUE_CORE);
         }
       }
     }
@@ -374,11 +378,14 @@ static bool add_part(const search *s) {
 
 static bool find_components(search *s) {
   const size_t *size = s->frame->size;
-  for (size_t i = 0; i < size[0] * size[1] * size[2]; ++i) {
-    const bool soft =
-        has_stage(s->stage[i], SUPINE_TISSUE_CORE) || has_stage(s->stage[i], SUPINE_TISSUE_OPEN);
-    if (soft && !(find_component(s, i) && add_part(s))) {
-      return false;
+  for (size_t row = 0; row < size[1] * size[2]; ++row) {
+    const size_t first = size[0] * row;
+    for (size_t i = first + s->span[row].begin; i < first + s->span[row].end; ++i) {
+      const bool soft =
+          has_stage(s->stage[i], SUPINE_TISSUE_CORE) || has_stage(s->stage[i], SUPINE_TISSUE_OPEN);
+      if (soft && !(find_component(s, i) && add_part(s))) {
+        return false;
+      }
     }
   }
   return true;
@@ -438,7 +445,8 @@ supine_status supine_warp_tissue_find_labels(const supine_field *field, const su
 }
 
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error) {
-  search s = {.frame = &tissue->kind, .stage = tissue->kind.values, .tissue = tissue};
+  search s = {
+      .frame = &tissue->kind, .stage = tissue->kind.values, .span = tissue->span, .tissue = tissue};
   SUPINE_TRY(open_by_ball(&s, error));
   const bool good = find_components(&s);
   free(s.list);
@@ -449,10 +457,15 @@ supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error 
 supine_status supine_warp_tissue_add_labels(const supine_image *labels, const double *wanted,
                                             size_t count, supine_tissue *tissue,
                                             supine_error *error) {
-  const size_t voxels = labels->size[0] * labels->size[1] * labels->size[2];
+  const size_t rows = labels->size[1] * labels->size[2];
+  const size_t voxels = labels->size[0] * rows;
   SUPINE_ARENA arena = {0};
   unsigned char *stage = supine_arena_zeros(&arena, voxels, 1);
+  supine_warp_span *span = supine_arena_take(&arena, rows, sizeof *span);
   SUPINE_TRY(supine_arena_check(&arena, error, "a label map of %zu voxels", voxels));
+  for (size_t row = 0; row < rows; ++row) {
+    span[row] = (supine_warp_span){0, labels->size[0]};
+  }
   for (size_t k = 0; k < count; ++k) {
     bool found = false;
     for (size_t i = 0; i < voxels; ++i) {
@@ -463,7 +476,7 @@ supine_status supine_warp_tissue_add_labels(const supine_image *labels, const do
     SUPINE_REFUSE_IF(!found, error, SUPINE_ERROR_ARGUMENT,
                      "no voxel of the label map has the value %g: give a value that it has",
                      wanted[k]);
-    search s = {.frame = labels, .stage = stage, .named = true, .tissue = tissue};
+    search s = {.frame = labels, .stage = stage, .span = span, .named = true, .tissue = tissue};
     const bool good = find_components(&s);
     free(s.list);
     if (!good) {
