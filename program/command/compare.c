@@ -75,7 +75,8 @@ static const supine_option table[] = {
      "structures made by 'supine embed' from the same basis: the report has the displacement of "
      "each, with its expected error",
      SUPINE_FILLS(request, inside), .file = SUPINE_FILE_IN},
-    {"all", 0, NULL, "also print the breath, and the regional expansion by height, as -o has them",
+    {"all", 0, NULL,
+     "also print every target, the breath, and the regional expansion by height, as -o has them",
      SUPINE_FILLS(request, all)},
     {"output", 'o', "FILE",
      ".html: a report to read and print\n.csv: a table with a row for the surface, each lung and "

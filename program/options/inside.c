@@ -270,19 +270,28 @@ json_t *supine_options_target_json(const supine_target *t) {
   return target;
 }
 
+/* Return whether target b is to be told of before target a. */
+static bool tell_before(const supine_target *b, const supine_target *a) {
+  const bool known = a->moved_error > 0.0 && b->moved_error > 0.0;
+  const bool farther = known ? b->moved * a->moved_error > a->moved * b->moved_error
+                             : b->moved > a->moved; /* expected errors may be unknown */
+  return a->anatomy != b->anatomy ? a->anatomy : farther;
+}
+
 size_t supine_options_targets_first(const supine_target *targets, size_t count) {
   size_t first = 0;
   for (size_t i = 1; i < count; ++i) {
-    const supine_target *a = &targets[first];
-    const supine_target *b = &targets[i];
-    const bool known = a->moved_error > 0.0 && b->moved_error > 0.0;
-    const bool farther = known ? b->moved * a->moved_error > a->moved * b->moved_error
-                               : b->moved > a->moved; /* expected errors may be unknown */
-    if (a->anatomy != b->anatomy ? a->anatomy : farther) {
-      first = i;
-    }
+    first = tell_before(&targets[i], &targets[first]) ? i : first;
   }
   return first;
+}
+
+size_t supine_options_targets_before(const supine_target *targets, size_t count, size_t which) {
+  size_t before = 0;
+  for (size_t i = 0; i < count; ++i) {
+    before += tell_before(&targets[i], &targets[which]) ? 1 : 0;
+  }
+  return before;
 }
 
 void supine_options_targets_score(const supine_target *targets, size_t count, double *score) {

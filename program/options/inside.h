@@ -64,6 +64,9 @@ supine_status supine_options_targets_find(const supine_basis *inside,
  * of its expected error. Targets come before anatomy. */
 size_t supine_options_targets_first(const supine_target *targets, size_t count);
 
+/* Return how many targets are to be told of before target `which`, in the same order. */
+size_t supine_options_targets_before(const supine_target *targets, size_t count, size_t which);
+
 /* Free *targets; for SUPINE_FREED_BY. */
 void supine_options_targets_free(supine_target **targets);
 

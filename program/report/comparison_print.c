@@ -91,11 +91,43 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
   (void)json_array_append_new(json_object_get(tables, heading), row);
 }
 
+/* Add the targets in a posture: all, or the `most` to tell of first. Return how many are left out.
+ */
+static size_t add_targets(const supine_comparison *c, const supine_compared_posture *p, size_t most,
+                          json_t *text) {
+  size_t left_out = 0;
+  for (size_t k = 0; k < c->names.count; ++k) {
+    if (supine_options_targets_before(p->targets, c->names.count, k) < most) {
+      add_row(text, p->targets[k].anatomy ? "anatomy" : "targets", "posture", p->label,
+              supine_options_target_json(&p->targets[k]));
+    } else {
+      ++left_out;
+    }
+  }
+  return left_out;
+}
+
+/* Return how many targets of a posture are printed, so that a screen of 24 lines shows some of each
+ * posture. */
+static size_t targets_most(const supine_comparison *c, bool all) {
+  static const size_t rows = 12;
+  size_t moved = 0;
+  for (size_t i = 0; i < c->postures.count; ++i) {
+    moved += c->posture[i].displacement.max > 0.0 ? 1 : 0;
+  }
+  if (all || moved == 0) {
+    return SIZE_MAX;
+  }
+  return moved < rows ? rows / moved : 1;
+}
+
 /* Add to `text` the tables that compare the postures. */
 static void add_tables(const supine_comparison *c, bool all, json_t *text) {
   char gained[64];
   (void)supine_print_text(gained, sizeof gained,
                           "volume (mL) that each lung gains in a breath of %.4g mL", c->breath);
+  const size_t most = targets_most(c, all);
+  size_t left_out = 0;
   for (size_t i = 0; i < c->postures.count; ++i) {
     const supine_compared_posture *p = &c->posture[i];
     json_t *moved = statistics(&p->displacement);
@@ -111,15 +143,18 @@ static void add_tables(const supine_comparison *c, bool all, json_t *text) {
     }
     add_row(text, "displacement, mm", "posture", p->label, moved);
     if (c->inside != NULL && p->displacement.max > 0.0) {
-      for (size_t k = 0; k < c->names.count; ++k) {
-        add_row(text, p->targets[k].anatomy ? "anatomy" : "targets", "posture", p->label,
-                supine_options_target_json(&p->targets[k]));
-      }
+      left_out += add_targets(c, p, most, text);
     }
     add_row(text, "volume of each lung, mL", "posture", p->label, volumes(c, i, true));
     if (p->has_breath && all) {
       add_row(text, gained, "posture", p->label, by_lung(c, p->gain));
     }
+  }
+  if (left_out > 0) {
+    char more[80];
+    (void)snprintf(more, sizeof more, "%zu rows with less displacement over its error; see --all",
+                   left_out);
+    (void)json_object_set_new(text, "targets left out", json_string(more));
   }
   const size_t slabs = all && c->breath > 0.0 ? SUPINE_COMPARISON_SLABS : 0;
   for (size_t s = 0; s < slabs; ++s) {
@@ -143,15 +178,17 @@ static void add_tables(const supine_comparison *c, bool all, json_t *text) {
 /* Return the text in the order of what was asked for: targets, displacements, volumes. The file and
  * its surface are left out unless all is wanted. Free `root`. */
 static json_t *order_text(json_t *root, bool all) {
-  static const char *const first[] = {"volume", "displacement_from", "targets"};
+  static const char *const first[] = {"volume", "displacement_from", "targets", "targets left out"};
   static const char *const left_out[] = {"file", "vertices", "area_mm2"};
   json_t *text = json_object();
-  for (size_t i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < sizeof first / sizeof *first; ++i) {
     json_t *value = json_object_get(root, first[i]);
     if (value != NULL) {
       (void)json_object_set(text, first[i], value);
     }
-    if (!all) {
+  }
+  if (!all) {
+    for (size_t i = 0; i < sizeof left_out / sizeof *left_out; ++i) {
       (void)json_object_del(root, left_out[i]);
     }
   }
