@@ -9,9 +9,12 @@ message to result.json as the failure. If an output cannot be written or a signa
 the next run computes the subject again. The program is $SUPINE (default: supine)."""
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
+
+from names import fault
 
 OUTPUT_FAILED = 4  # exit code of supine
 
@@ -39,6 +42,8 @@ def work(folder, volume, report, options, meshes):
 
 def main(output, volume, report, options, *meshes):
     folder = os.path.dirname(output)
+    if re.search(r"[^./]/+\.\./", output) or fault(os.path.basename(folder)):
+        sys.exit(f"{output}: name the subject by letters, digits and - . _ +, as this names its folder")
     os.makedirs(folder, exist_ok=True)
     result = {"subject": os.path.basename(folder)}
     for stale in ("basis.safetensors", "report.html"):

@@ -29,6 +29,7 @@ refused() {
 refused "postures.py grid ct.nii.gz terms taken" "taken: name a new folder"
 refused "postures.py grid ct.nii.gz terms none/new" "none/new: name a new folder, in one that exists"
 refused "postures.py grid ct.nii.gz absent new" "absent: no such file; an archive needs the terms"
+refused "subject.py results/../evil/result.json rest no  lungs.ply" "name the subject by letters"
 refused "postures.py absent.safetensors ct.nii.gz terms new" "absent.safetensors: "
 refused "postures.py terms ct.nii.gz terms new" "terms: "
 echo "posture,volume,weight
