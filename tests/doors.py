@@ -221,6 +221,10 @@ MISTAKES = {
         "shifted": with_part(ct, origin=ct["origin"] + [0, 0, 60]),
         "range": with_part(ct, values=(-ct["values"] - 810).astype(np.int16)),
         "finite": with_part(ct, values=np.full(ct["values"].shape, np.nan, np.float32)), "cut": None}),
+    "frame": (write_image, ".nrrd", {  # an image of which only the grid of voxels counts
+        RIGHT: ct, "unit": with_part(ct, step=ct["step"] / 1000, origin=ct["origin"] / 1000),
+        "axes": with_part(ct, origin=ct["origin"] * RAS, step=ct["step"] * RAS),
+        "shifted": with_part(ct, origin=ct["origin"] + [0, 0, 150])}),
     "fields": (write_fields, ".fields.st", {
         RIGHT: field, "unit": {**field, "displacement": field["displacement"] / 1000},
         "axes": {**field, "displacement": field["displacement"] * RAS},
@@ -359,6 +363,7 @@ DOORS = [
      lambda x: dicom("deform", "grid.st", "--posture", "prone:rest", "--labels", x, "-o", "out.nrrd")),
     ("dose.py --dose", "script", "dose", add_dose),
     ("embed LABELS", "command", "labels", lambda x: command("embed", "lungs.st", x, "--labels", "all", "-o", "out.st")),
+    ("embed IMAGE", "command", "frame", lambda x: command("embed", "lungs.st", x, "--grid", 10, "-o", "out.st")),
     ("deform --image", "command", "image",
      lambda x: command("deform", "grid.st", "--posture", "prone:rest", "--image", x, "--density", "-o", "out.nrrd")),
     ("deform --labels", "command", "labels",

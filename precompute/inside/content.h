@@ -20,6 +20,7 @@ typedef struct supine_inside_content {
   uint32_t *rigid;     /**< [count] 1 + index of the rigid piece of each point, whose points follow
                           each other; 0 if the point deforms. Unused for a grid */
   supine_image grid;   /**< for a grid: numbers of nodes, position of the first node, and steps */
+  double unseen;       /**< share of the lungs' vertices outside the image of the grid; else 0 */
 } supine_inside_content;
 
 /** Append each point of a file as one part. Options as supine_io_points_read. */

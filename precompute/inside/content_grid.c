@@ -25,6 +25,26 @@ static void cover(const supine_inside_shells *shells, const supine_image *grid, 
   }
 }
 
+/* Return the share of the vertices of the lungs that lie outside an image. */
+static double find_unseen(const supine_inside_shells *shells, const supine_image *image) {
+  size_t count = 0;
+  size_t unseen = 0;
+  for (size_t lung = 0; lung < shells->count; ++lung) {
+    const supine_inside_shell *shell = &shells->shell[lung];
+    count += shell->vertex_count;
+    for (size_t i = 0; i < shell->vertex_count; ++i) {
+      double voxel[3];
+      bool seen = true;
+      supine_image_locate(image, shell->vertices + 3 * i, voxel);
+      for (size_t k = 0; k < 3; ++k) {
+        seen = seen && voxel[k] >= -1.0 && voxel[k] <= (double)image->size[k];
+      }
+      unseen += seen ? 0 : 1;
+    }
+  }
+  return (double)unseen / (double)count;
+}
+
 /* Make the axes of an image right-angled: keep the first, the plane of the first two, and the
  * distance between slices. DICOM and ITK have no other grids; a CT with a tilted gantry has. */
 static void make_right_angled(supine_image *image) {
@@ -164,6 +184,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   SUPINE_REFUSE_IF(!(spacing > 0.0) || !isfinite(spacing), error, SUPINE_ERROR_ARGUMENT,
                    "the grid's spacing is %g mm: give one above 0", spacing);
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
+  content->unseen = like != NULL ? find_unseen(shells, like) : 0.0;
   const double diagonal = supine_image_cell_diagonal(&grid);
   const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
   SUPINE_ARENA arena = {0};

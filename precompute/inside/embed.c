@@ -153,6 +153,13 @@ static void find_box(const supine_inside_shells *shells, double low[3], double h
 /* Warn of parts that lie outside the lungs and not between them, as those of another person do. A
  * coarse surface cuts corners off the lungs, by up to about its edge length. */
 static void check_belonging(const embedding *e, supine_findings *findings) {
+  const double seen = 1.0 - e->content->unseen;
+  if (supine_input_judge(SUPINE_INPUT_IMAGE_FRAME, seen) != SUPINE_INPUT_TAKEN) {
+    supine_findings_warn(findings,
+                         "only %.0f %% of the lungs lie in the image of the grid: give an image in "
+                         "the frame of the scan",
+                         100.0 * seen);
+  }
   const supine_inside_content *content = e->content;
   const supine_basis_info *info = supine_basis_get_info(e->shells->basis);
   const int single = info->lung_names[0][0] == 'l' ? 1 : -1;
