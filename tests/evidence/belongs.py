@@ -2,14 +2,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measure how far what belongs to lungs lies outside them, and what belongs to another person.
 
-    tests/evidence/belongs.py BUILD COPD [LOBES...]
+    tests/evidence/belongs.py BUILD COPD [--all] [LOBES...]
 
-BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, LOBES
+Takes the first three people of COPD, about a minute of processor time, or with --all every one, as docs/inputs.md does,
+about three. BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, LOBES
 are label maps of the lobes of further people. Prints, for docs/inputs.md, the share of the vertices of own and of
 others' lungs and lobes that lie more than 5 mm and an edge outside the surface of a basis and not between the lungs;
-how far the backs of two lungs are apart; and the share of the lungs that is no lung, hence without air, in the own CT,
-in the same 12 and 30 mm off, in the exhaled one, and in others'; and how many different values label maps have, and
-the slices of CT, MR and scintigraphy that pydicom brings. Needs nibabel and pydicom; exit code 77: no data."""
+how far the backs of two lungs are apart; the share of the lungs that is no lung, hence without air, in the own CT,
+in the same 12 and 30 mm off, in the exhaled one, and in others'; the half ball on the section of a lung at the border
+of an image that shows all but a share of it; and how many different values label maps have, and
+the slices of CT, MR and scintigraphy that pydicom brings. Each line states the people, the measurements n, and the
+range of the largest and of the smallest value if each person is left out in turn. Needs nibabel and pydicom; exit code
+77: no data."""
 import glob
 import itertools
 import os
@@ -31,8 +35,15 @@ def run(*words, check=True):
     return subprocess.run(list(map(str, words)), check=check, capture_output=True, text=True).stdout
 
 
-def show(title, values):
-    print(f"{title}: {min(values):.3f} to {max(values):.3f}, n {len(values)}", flush=True)
+def show(title, found):
+    """Print the range of what was found. found: values, each a list of the people who are in it, and a number"""
+    values = [value for _, value in found]
+    people = {person for who, _ in found for person in who}
+    without = [[value for who, value in found if person not in who] for person in people]
+    ends = [sorted(end(rest) for rest in without if rest) for end in (min, max)]
+    left_out = "".join(f", {name} {each[0]:.4f} to {each[-1]:.4f}" for name, each in zip(("least", "most"), ends) if each)
+    print(f"{title}: {min(values):.4f} to {max(values):.4f}, {len(people)} people, n {len(values)}"
+          f"{left_out and '; without one' + left_out}", flush=True)
 
 
 def outside(supine, basis, edge, path, labels):
@@ -57,14 +68,15 @@ def contents(supine, maps):
         made[edge, i] = f"{edge}_{i}.st"
         run(supine, "precompute", path, *words, "--edge", edge, *FAST, "-o", made[edge, i])
     for edge in (6, 12):
-        own = [outside(supine, made[edge, i], edge, *each[:2]) for i, each in enumerate(maps)]
-        show(f"own lungs and lobes outside, edge {edge}", sum(own, []))
+        own = [((i,), share) for i, each in enumerate(maps)
+               for share in outside(supine, made[edge, i], edge, *each[:2])]
+        show(f"own lungs and lobes outside, edge {edge}", own)
     for labels in ("1", "all"):
-        others = [max(outside(supine, made[6, i], 6, *b[:2])) for (i, a), b in itertools.product(enumerate(maps), maps)
-                  if a is not b and a[1] == b[1] == labels]
+        others = [((i, j), max(outside(supine, made[6, i], 6, *b[:2])))
+                  for (i, a), (j, b) in itertools.permutations(enumerate(maps), 2) if a[1] == b[1] == labels]
         if others:
             show(f"labels '{labels}' of others outside", others)
-    show("backs apart / depth", [a / b for a, b in (apart(tensors(made[6, i])) for i in range(len(maps)))])
+    show("backs apart / depth", [((i,), a / b) for i in range(len(maps)) for a, b in (apart(tensors(made[6, i])),)])
 
 
 def read_mask(path):
@@ -89,25 +101,45 @@ def airless(lungs, other, shift=0.0):
 def images(copd, people):
     """Show how much of the lungs has no air in their own CT, in this CT moved, and in that of another person."""
     full, rest = ([read_mask(f"{copd}/{p}_{state}.nii.gz") for p in people] for state in ("insp", "exp"))
-    show("own CT, without air", [airless(scan, scan) for scan in full])
+    each = lambda measure: [((i,), measure(i)) for i in range(len(people))]
+    show("own CT, without air", each(lambda i: airless(full[i], full[i])))
     for shift in (12, 30, -30):
-        show(f"own CT {shift} mm off, without air", [airless(scan, scan, shift) for scan in full])
-    show("own exhaled CT, without air", [airless(scan, other) for scan, other in zip(full, rest)])
-    show("CT of others, without air", [airless(a, b) for a, b in itertools.permutations(full, 2)])
+        show(f"own CT {shift} mm off, without air", each(lambda i, shift=shift: airless(full[i], full[i], shift)))
+    show("own exhaled CT, without air", each(lambda i: airless(full[i], rest[i])))
+    show("CT of others, without air",
+         [((i, j), airless(full[i], full[j])) for i, j in itertools.permutations(range(len(people)), 2)])
+
+
+def cuts(copd, people):
+    """Show the half ball at the border of an image that shows all of a lung but a share at the head or the feet."""
+    found = {lost: [] for lost in (0.0005, 0.005)}
+    for (i, person), state in itertools.product(enumerate(people), ("insp", "exp")):
+        image = nibabel.load(f"{copd}/{person}_{state}.nii.gz")
+        mask, spacing = np.asarray(image.dataobj) > 0, np.abs(np.diag(image.affine)[:3])
+        columns = np.flatnonzero(mask.any((1, 2)))
+        middle = (columns[0] + columns[-1]) // 2
+        for lung, step, lost in itertools.product((mask[:middle], mask[middle:]), (1, -1), found):
+            layers = lung.sum((0, 1))[::step]
+            area = layers[np.searchsorted(np.cumsum(layers), lost * layers.sum())] * spacing[0] * spacing[1]
+            found[lost].append(((i,), 2 / 3 / np.pi ** 0.5 * area ** 1.5 / (layers.sum() * spacing.prod())))
+    for lost, values in found.items():
+        show(f"half ball / lung, without {lost:g} of its volume", values)
 
 
 def values(maps):
     """Show how many different values label maps and real slices have."""
-    show("label maps, different values", [len(np.unique(np.asanyarray(nibabel.load(path).dataobj))) for path in maps])
+    count = lambda title, found: print(f"{title}: {min(found)} to {max(found)}, n {len(found)}", flush=True)
+    count("label maps, different values", [len(np.unique(np.asanyarray(nibabel.load(path).dataobj))) for path in maps])
     folder = os.path.join(os.path.dirname(pydicom.__file__), "data/test_files")
-    show("slices of CT, MR and scintigraphy, different values",
-         [len(np.unique(pydicom.dcmread(f"{folder}/{name}.dcm").pixel_array)) for name in SLICES])
+    count("slices of CT, MR and scintigraphy, different values",
+          [len(np.unique(pydicom.dcmread(f"{folder}/{name}.dcm").pixel_array)) for name in SLICES])
 
 
 def main(build, copd, *lobes):
     supine, copd = os.path.abspath(os.path.join(build, "supine")), os.path.abspath(copd)
     people = sorted({os.path.basename(path)[:6] for path in glob.glob(copd + "/case*_insp.nii.gz")})
-    lobes = list(map(os.path.abspath, lobes))
+    people = people if "--all" in lobes else people[:3]
+    lobes = [os.path.abspath(path) for path in lobes if path != "--all"]
     if not people or not os.path.exists(supine):
         sys.exit(77)
     with tempfile.TemporaryDirectory() as folder:
@@ -115,6 +147,7 @@ def main(build, copd, *lobes):
         contents(supine, [(f"{copd}/{p}_insp.nii.gz", "1", ()) for p in people] +
                  [(path, "all", ("--labels", "lobes")) for path in lobes])
         images(copd, people)
+        cuts(copd, people)
     values([*glob.glob(copd + "/*.nii.gz"), *lobes])
 
 
