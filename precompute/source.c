@@ -78,7 +78,7 @@ static void note_map(const char *path, const supine_labels_report *report,
   for (size_t i = 0; i < report->lung_count; ++i) {
     const supine_labels_lung *lung = &report->lung[i];
     const char *side = lung->side > 0 ? "left" : "right";
-    if (lung->cut) {
+    if (supine_input_judge(SUPINE_INPUT_LUNG_CUT, lung->cut / lung->mask) != SUPINE_INPUT_TAKEN) {
       supine_findings_warn(findings,
                            "%s: the %s lung is cut off at the image's border: give a scan "
                            "that shows all of it",

@@ -92,17 +92,33 @@ static supine_status make_mask(work *w, const labels_tally *tally, const uint8_t
   return supine_labels_mask_cut(&w->image, low, high, LABELS_MARGIN, side, &w->both);
 }
 
-/* Return whether the bounding box of a lung reaches the border of the image, which probably cuts
- * off a part of the lung. */
-static bool is_cut(const work *w, const labels_mask *lung, size_t margin) {
-  bool cut = false;
+/* Return the area of a lung in a layer of its mask across an axis, mm^2. */
+static double area_of_layer(const labels_mask *lung, int axis, size_t layer) {
+  const size_t stride[3] = {1, lung->size[0], lung->size[0] * lung->size[1]};
+  size_t voxels = 0;
+  for (size_t i = 0; i < supine_labels_mask_count(lung); ++i) {
+    voxels += lung->at[i] != 0 && i / stride[axis] % lung->size[axis] == layer;
+  }
+  return 1e3 * supine_labels_voxel_ml(lung) / lung->spacing[axis] * (double)voxels;
+}
+
+/* Return about the volume that the border of the image cuts off a lung, mL: a half ball on the
+ * largest section of the lung there. */
+static double find_cut(const work *w, const labels_mask *lung, size_t margin) {
+  static const double half_ball = 0.37613; /* volume of a half ball / area^1.5: 2 / (3 sqrt(pi)) */
+  double area = 0.0;
   for (int a = 0; a < w->bordered; ++a) {
-    const size_t size = w->report->size[a];
+    const long size = (long)w->report->size[a];
     const long first = w->both.from[a] + lung->from[a] + (long)margin;
     const long last = first + (long)(lung->size[a] - 2 * margin) - 1;
-    cut = cut || (size > 1 && (first == 0 || last + 1 == (long)size));
+    if (size > 1 && first == 0) {
+      area = fmax(area, area_of_layer(lung, a, margin));
+    }
+    if (size > 1 && last + 1 == size) {
+      area = fmax(area, area_of_layer(lung, a, lung->size[a] - margin - 1));
+    }
   }
-  return cut;
+  return 1e-3 * half_ball * area * sqrt(area);
 }
 
 /* Describe an image's axes, as "i to the left, j to the back, k to the head". */
@@ -235,7 +251,7 @@ static supine_status make_lung(work *w, uint8_t value, supine_labels_lung *lung,
   }
   lung->side = value == LABELS_LEFT ? 1 : -1;
   SUPINE_TRY(clean(w, value, margin, &mask, lung));
-  lung->cut = is_cut(w, &mask, margin);
+  lung->cut = find_cut(w, &mask, margin);
   double longest = 0.0;
   for (int a = 0; a < 3; ++a) {
     longest = fmax(longest, (double)(mask.size[a] - 2 * margin) * mask.spacing[a]);

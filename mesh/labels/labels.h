@@ -24,7 +24,7 @@ typedef struct supine_labels_options {
   size_t left_masks, right_masks;
   supine_axes axes; /**< axes of the header's coordinates; AUTO: as the header states */
   double edge;      /**< approximate distance between vertices, mm; 0 means SUPINE_LABELS_EDGE */
-  double close; /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */
+  double close;  /**< gaps in a lung are closed if not wider than twice this, mm; 0 closes none */
   bool any_size; /**< whether lungs may be smaller and longer than those of people */
   /** Receive the fraction done, 0 to 1; return false to stop. Optional. */
   bool (*progress)(void *context, double fraction);
@@ -42,7 +42,8 @@ typedef struct supine_labels_lung {
   double filled;   /**< volume of the cavities filled, mL */
   double surface;  /**< volume that the surface encloses, mL */
   long tunnels;    /**< genus of the surface: number of tunnels through the lung */
-  bool cut;        /**< whether the lung reaches the image's border, where it is cut off */
+  double cut;      /**< about the volume that the image's border cuts off: a half ball on the lung's
+                        section there, mL; 0 if the lung does not reach it */
 } supine_labels_lung;
 
 /** Geometry and labels of a label map, and how touching lungs were split. */

@@ -4,8 +4,8 @@
 
     tests/evidence/belongs.py BUILD COPD [--all] [LOBES...]
 
-Takes the first three people of COPD, about a minute of processor time, or with --all every one, as docs/inputs.md does,
-about three. BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, LOBES
+Takes the first three people of COPD, about a minute of processor time, or with --all every one, as docs/inputs.md does.
+BUILD is the folder of the build. COPD holds label maps caseNN_exp.nii.gz and caseNN_insp.nii.gz of both lungs, LOBES
 are label maps of the lobes of further people. Prints, for docs/inputs.md, the share of the vertices of own and of
 others' lungs and lobes that lie more than 5 mm and an edge outside the surface of a basis and not between the lungs;
 how far the backs of two lungs are apart; the share of the lungs that is no lung, hence without air, in the own CT,
@@ -41,7 +41,8 @@ def show(title, found):
     people = {person for who, _ in found for person in who}
     without = [[value for who, value in found if person not in who] for person in people]
     ends = [sorted(end(rest) for rest in without if rest) for end in (min, max)]
-    left_out = "".join(f", {name} {each[0]:.4f} to {each[-1]:.4f}" for name, each in zip(("least", "most"), ends) if each)
+    left_out = "".join(f", {name} {each[0]:.4f} to {each[-1]:.4f}"
+                       for name, each in zip(("least", "most"), ends) if each)
     print(f"{title}: {min(values):.4f} to {max(values):.4f}, {len(people)} people, n {len(values)}"
           f"{left_out and '; without one' + left_out}", flush=True)
 
