@@ -3,25 +3,12 @@
 // and its border has a contrast of at least 3 to 1.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { close, open, openLungs } from './browser.mjs';
+import { assertAccessible, close, open, openLungs } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
-import { folder, loadCommon, supine } from './support.mjs';
+import { folder, supine } from './support.mjs';
 
-const axe = loadCommon('axe-core').source;
 const report = join(folder, 'report.html');
 supine('compare', basis, '--postures', 'supine,prone,left,supine+15', '-o', report);
-
-async function check(page, what) {
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() =>
-    window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }),
-  );
-  assert.deepEqual(
-    violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`),
-    [],
-    what,
-  );
-}
 
 /** Return the contrast of two CSS colours as defined by WCAG. */
 function contrast(a, b) {
@@ -56,7 +43,7 @@ for (const [what, width, init, hash] of [
   const { page, complaints } = await open(html, { viewport: { width, height: 700 }, init }, hash);
   const isRead = !what.startsWith('before') && !what.endsWith('WebAssembly');
   if (isRead) await page.waitForFunction(() => document.getElementById('finding').textContent);
-  await check(page, what);
+  await assertAccessible(page, what);
   const [said, wide] = await page.evaluate(() => [
     document.body.innerText,
     document.documentElement.scrollWidth - window.innerWidth,
@@ -78,7 +65,7 @@ for (const colorScheme of ['light', 'dark']) {
   await page.evaluate(() => {
     for (const details of document.querySelectorAll('details')) details.open = true;
   });
-  await check(page, `the page, ${colorScheme}`);
+  await assertAccessible(page, `the page, ${colorScheme}`);
   const nameless = await page.evaluate(() =>
     [...document.querySelectorAll('button, input, select, canvas[tabindex]')]
       .filter((e) => {
@@ -127,7 +114,7 @@ for (const colorScheme of ['light', 'dark']) {
   await close(page);
 
   const second = await open(report, { colorScheme });
-  await check(second.page, `the report, ${colorScheme}`);
+  await assertAccessible(second.page, `the report, ${colorScheme}`);
   assert.deepEqual(second.complaints, []);
   await close(second.page);
 }

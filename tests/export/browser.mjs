@@ -2,7 +2,7 @@
 // Start a headless Chromium that draws in software, and open pages from disk in it.
 import assert from 'node:assert/strict';
 import { pathToFileURL } from 'node:url';
-import { evaluate, inOrder, load, matchPoints, skip } from './support.mjs';
+import { evaluate, inOrder, load, loadCommon, matchPoints, skip } from './support.mjs';
 
 const { chromium } = await load('playwright-core/index.mjs');
 if (!process.env.CHROMIUM || process.env.CHROMIUM.includes('NOTFOUND')) skip('no Chromium is installed');
@@ -142,6 +142,44 @@ export async function assertPicture(page, before, message, equal = true) {
     found = (await screenshot(page)).equals(before) === equal;
   } while (!found && Date.now() < end);
   assert.ok(found, message);
+}
+
+/** Check that the picture is the same after the loss of the WebGL context. */
+export async function checkLoss(page) {
+  const before = await picture(page);
+  await page.evaluate(() => {
+    window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context');
+    window.lose.loseContext();
+  });
+  await page.waitForFunction(() => window.supine.picture === null);
+  await page.evaluate(() => window.lose.restoreContext());
+  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
+  await assertPicture(page, before, 'the picture differs after the loss of the context');
+}
+
+const RULES = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
+
+/** Assert that axe-core finds no violation in a page. */
+export async function assertAccessible(page, what) {
+  await page.evaluate(loadCommon('axe-core').source);
+  const { violations } = await page.evaluate((runOnly) => window.axe.run(document, { runOnly }), RULES);
+  assert.deepEqual(
+    violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`),
+    [],
+    what,
+  );
+}
+
+/** Assert that the window shows all of some elements, and is as wide as the page. */
+export async function assertUncut(page, selector, what) {
+  const fits = await page.evaluate((wanted) => {
+    const all = [...document.querySelectorAll(wanted)].map((element) => element.getBoundingClientRect());
+    return (
+      document.documentElement.scrollWidth <= innerWidth &&
+      all.every((b) => b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5))
+    );
+  }, selector);
+  assert.ok(fits, `${what}: something is cut`);
 }
 
 /** Wait until a change is drawn. */

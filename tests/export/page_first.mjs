@@ -6,11 +6,10 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { close, openLungs, press, settled } from './browser.mjs';
+import { assertAccessible, close, openLungs, press, settled } from './browser.mjs';
 import { basis } from './lungs.mjs';
-import { folder, loadCommon, pictureFolder, supine } from './support.mjs';
+import { folder, pictureFolder, supine } from './support.mjs';
 
-const axe = loadCommon('axe-core').source;
 const LONGEST = 28; // characters of a name in the picture
 const NAMES = [
   'still',
@@ -57,18 +56,6 @@ writeFileSync(
 );
 supine('embed', basis, points, lobe, '-o', inside);
 supine('export', basis, '--inside', inside, '-o', html);
-
-async function check(page, what) {
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() =>
-    window.axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }),
-  );
-  assert.deepEqual(
-    violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`),
-    [],
-    what,
-  );
-}
 
 /** Record the texts of the picture, and the colours of the lines of the outlines. */
 const record = () => {
@@ -235,7 +222,7 @@ for (const gravity of [
     `gravity ${gravity}: the body reaches ${deepest} mm down, the table is at ${table}`,
   );
 }
-await check(page, 'anatomy is chosen');
+await assertAccessible(page, 'anatomy is chosen');
 assert.deepEqual(complaints, []);
 await page.close();
 
@@ -279,7 +266,7 @@ for (const [width, height, colorScheme, chosen] of [
     await sized.evaluate(() => document.documentElement.scrollWidth <= innerWidth),
     `${width} x ${height}: something is cut`,
   );
-  await check(sized, `${width} x ${height}, ${colorScheme}, target ${chosen}`);
+  await assertAccessible(sized, `${width} x ${height}, ${colorScheme}, target ${chosen}`);
   writeFileSync(join(pictures, `${width}x${height}-${colorScheme}.png`), await sized.screenshot());
   assert.deepEqual(said, []);
   await close(sized);

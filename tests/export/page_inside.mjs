@@ -5,11 +5,20 @@
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
+import {
+  assertAccessible,
+  assertPicture,
+  assertUncut,
+  checkLoss,
+  close,
+  openLungs,
+  picture,
+  press,
+  settled,
+} from './browser.mjs';
 import { basis, mesh } from './lungs.mjs';
-import { folder, largestDistance, loadCommon, pictureFolder, supine } from './support.mjs';
+import { folder, largestDistance, pictureFolder, supine } from './support.mjs';
 
-const axe = loadCommon('axe-core').source;
 const TOLERANCE_MM = 0.02; // the page stores 16-bit numbers
 const PRINTED_MM = 0.001; // tolerance: numbers in text files have three decimals
 const WRITTEN_MM = 0.071; // tolerance: displacements in the table have one decimal, and the page stores 16-bit numbers
@@ -285,20 +294,6 @@ async function checkControls(page) {
   await close(again);
 }
 
-/** Check that the picture is the same after the loss of the WebGL context. */
-async function checkLoss(page) {
-  await page.mouse.move(5, 5);
-  const before = await picture(page);
-  await page.evaluate(() => {
-    window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context');
-    window.lose.loseContext();
-  });
-  await page.waitForFunction(() => window.supine.picture === null);
-  await page.evaluate(() => window.lose.restoreContext());
-  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  await assertPicture(page, before, 'the picture differs after the loss of the context');
-}
-
 async function checkSizes() {
   const pictures = pictureFolder('page_inside');
   for (const [width, height, colorScheme] of [
@@ -313,17 +308,7 @@ async function checkSizes() {
       { viewport: { width, height }, colorScheme, ...(touch && { hasTouch: true }) },
       '#posture=left&target=4',
     );
-    assert.ok(
-      await page.evaluate(
-        () =>
-          document.documentElement.scrollWidth <= innerWidth &&
-          [...document.querySelectorAll('#panel button, #panel input, #inside-table td')].every((e) => {
-            const b = e.getBoundingClientRect();
-            return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5);
-          }),
-      ),
-      `${width} x ${height}: something is cut`,
-    );
+    await assertUncut(page, '#panel button, #panel input, #inside-table td', `${width} x ${height}`);
     if (touch) {
       await page.locator('#picture').evaluate((canvas) => canvas.scrollIntoView({ block: 'center' }));
       await page.touchscreen.tap(...(await onPage(page, 'carina')));
@@ -334,16 +319,7 @@ async function checkSizes() {
     writeFileSync(join(pictures, `${width}x${height}-${colorScheme}.png`), await page.screenshot());
     if (width === 1400 || touch) {
       // check accessibility at three sizes; these have the light and the dark theme
-      await page.evaluate(axe);
-      const { violations } = await page.evaluate(() =>
-        window.axe.run(document, {
-          runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'],
-        }),
-      );
-      assert.deepEqual(
-        violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html.slice(0, 120)).join(' | ')}`),
-        [],
-      );
+      await assertAccessible(page, `${width} x ${height}`);
     }
     assert.deepEqual(complaints, []);
     await close(page);
@@ -504,6 +480,7 @@ await checkPointer(page, await checkTable(page));
 await checkControls(page);
 await checkDays(page);
 assert.deepEqual(complaints, []);
+await page.mouse.move(5, 5);
 await checkLoss(page);
 await close(page);
 await checkLens();

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { close, openLungs, press, settled } from './browser.mjs';
+import { assertUncut, close, openLungs, press, settled } from './browser.mjs';
 import { html } from './lungs.mjs';
 import { pictureFolder } from './support.mjs';
 
@@ -24,17 +24,7 @@ for (const [width, height] of [
     { viewport: { width, height }, ...(touch && { hasTouch: true }) },
     '#posture=left',
   );
-  assert.ok(
-    await page.evaluate(
-      () =>
-        document.documentElement.scrollWidth <= innerWidth &&
-        [...document.querySelectorAll('#panel button, #panel input')].every((e) => {
-          const b = e.getBoundingClientRect();
-          return b.width === 0 || (b.left >= 0 && b.right <= innerWidth + 0.5);
-        }),
-    ),
-    `${width} x ${height}: something is cut`,
-  );
+  await assertUncut(page, '#panel button, #panel input', `${width} x ${height}`);
   if (touch) {
     // a tap marks a point of the picture, and does not turn the camera
     const box = await page.locator('#picture').boundingBox();

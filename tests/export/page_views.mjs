@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Test views, pan, zoom, postures, display options, probes (marked points), links and a lost WebGL context on the page.
 import assert from 'node:assert/strict';
-import { assertPicture, close, openLungs, picture, press, settled } from './browser.mjs';
+import { assertPicture, checkLoss, close, openLungs, picture, press, settled } from './browser.mjs';
 import { basis, html } from './lungs.mjs';
 
 /** Check that each view shows the side of the body that it names, with the patient's axes in the right directions. */
@@ -283,21 +283,6 @@ async function checkProbes(page) {
   await page.locator('#probes-clear').click();
 }
 
-/** Check that the picture is the same after the loss of the WebGL context. */
-async function checkLoss(page) {
-  await press(page, '3');
-  await page.mouse.move(5, 5);
-  const before = await picture(page);
-  await page.evaluate(() => {
-    window.lose = window.supine.picture.gl.getExtension('WEBGL_lose_context');
-    window.lose.loseContext();
-  });
-  await page.waitForFunction(() => window.supine.picture === null);
-  await page.evaluate(() => window.lose.restoreContext());
-  await page.waitForFunction(() => window.supine.picture !== null && document.getElementById('message').hidden);
-  await assertPicture(page, before, 'the picture differs after the loss of the context');
-}
-
 /** Check that an idle page draws nothing, and that a changed page is drawn. */
 async function checkFrames(page) {
   const [drawn, touched] = await page.evaluate(async () => {
@@ -335,6 +320,8 @@ await checkWrongLinks(page);
 await checkSides(page);
 await checkProbes(page);
 await checkFrames(page);
+await press(page, '3');
+await page.mouse.move(5, 5);
 await checkLoss(page);
 const bytes = await page.evaluate(async () =>
   Array.from(new Uint8Array(await (await window.supine.picturePng()).arrayBuffer()).slice(0, 8)),

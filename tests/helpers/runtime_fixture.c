@@ -458,6 +458,21 @@ void fixture_write(const fixture *f, const char *path) {
   }
 }
 
+supine_basis *fixture_open(const unsigned char *bytes, size_t size, supine_storage storage,
+                           supine_simd simd) {
+  const supine_basis_options options = {sizeof options, .storage = storage, .simd = simd};
+  supine_basis *basis = NULL;
+  supine_error error = {0};
+  const supine_status status = supine_basis_open_memory_with(bytes, size, &options, &basis, &error);
+  if (status == SUPINE_ERROR_UNSUPPORTED) {
+    return NULL;
+  }
+  if (status != SUPINE_OK) {
+    fail_msg("%s", error.message);
+  }
+  return basis;
+}
+
 unsigned char *fixture_bytes(const fixture *f, size_t *size) {
   char *folder = fixture_folder();
   char path[256];

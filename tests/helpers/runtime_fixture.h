@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <supine/runtime.h>
+
 typedef struct fixture {
   size_t vertices, triangles, modes, lungs;
   size_t band; /* largest degree of the spherical harmonics */
@@ -90,6 +92,10 @@ void fixture_write(const fixture *f, const char *path);
 
 /* Return the content of the basis file (malloc), and set `size` to its size in bytes. */
 unsigned char *fixture_bytes(const fixture *f, size_t *size);
+
+/* Open a basis in memory. Return NULL if this processor lacks the instruction set. */
+supine_basis *fixture_open(const unsigned char *bytes, size_t size, supine_storage storage,
+                           supine_simd simd);
 
 /* Compute the positions xyz [N, 3], mm, in double precision. `scales` [lungs] are factors of the
  * displacement. */

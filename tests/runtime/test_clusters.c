@@ -29,20 +29,8 @@ static void drop(opened *o) {
   fixture_destroy(o->f);
 }
 
-/* Open the basis. Return NULL if this processor lacks the instruction set. */
 static supine_basis *open_as(const opened *o, supine_simd simd) {
-  const supine_basis_options options = {sizeof options, .simd = simd};
-  supine_basis *basis = NULL;
-  supine_error error = {0};
-  const supine_status status =
-      supine_basis_open_memory_with(o->bytes, o->size, &options, &basis, &error);
-  if (status == SUPINE_ERROR_UNSUPPORTED) {
-    return NULL;
-  }
-  if (status != SUPINE_OK) {
-    fail_msg("%s", error.message);
-  }
-  return basis;
+  return fixture_open(o->bytes, o->size, SUPINE_STORAGE_AUTO, simd);
 }
 
 /* Make a pose with other gains for each lung and axis. */
