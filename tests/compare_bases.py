@@ -10,6 +10,7 @@ status is 1 if anything differs. DATA_FOLDER has the folders lungs and covid (te
 import difflib
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -99,7 +100,8 @@ def run(program, words, folder, places):
         with open(os.path.join(folder, name), "rb") as file:
             wrote[name] = file.read().replace(program.encode(), b"supine")
         os.remove(os.path.join(folder, name))
-    return (result.stdout + result.stderr).replace(program, "supine"), wrote
+    said = re.sub("(?m)^compute time per frame: .*\n", "", result.stdout + result.stderr)
+    return said.replace(program, "supine"), wrote
 
 
 def open_basis(path):

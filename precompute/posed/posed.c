@@ -20,14 +20,16 @@ double supine_posed_volume(const supine_basis *basis, const supine_pose *pose) {
 supine_status supine_posed_positions(const supine_basis *basis, const supine_pose *pose,
                                      double *positions, supine_error *error) {
   const size_t n = supine_basis_get_info(basis)->vertex_count;
+  const float *found = supine_basis_vertices(basis);
   SUPINE_ARENA arena = {0};
-  float *xyz = supine_arena_take(&arena, n, 3 * sizeof *xyz);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
   if (pose != NULL) {
+    float *xyz = supine_arena_take(&arena, n, 3 * sizeof *xyz);
+    SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
     (void)supine_deform(basis, pose, xyz);
+    found = xyz;
   }
   for (size_t i = 0; i < 3 * n; ++i) {
-    positions[i] = (double)(pose != NULL ? xyz : supine_basis_vertices(basis))[i];
+    positions[i] = (double)found[i];
   }
   return SUPINE_OK;
 }

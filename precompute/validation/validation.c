@@ -131,11 +131,12 @@ static supine_status distance_at(const supine_validation *s,
   supine_pose pose = outcome->pose;
   double *positions = look->positions;
   double sum = 0.0;
-  for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
-    pose.gains[i / 3][i % 3] *= outcome->scale != 0.0 ? scale / outcome->scale : 0.0;
-  }
   if (outcome->scale == 0.0) {
     supine_pose_fill(&pose, scale);
+  } else {
+    for (size_t i = 0; i < 3 * SUPINE_LUNGS_MAX; ++i) {
+      pose.gains[i / 3][i % 3] *= scale / outcome->scale;
+    }
   }
   SUPINE_TRY(supine_posed_positions(s->basis, &pose, positions, error));
   for (size_t i = 0; i < look->measured_count; ++i) {

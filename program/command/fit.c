@@ -33,13 +33,13 @@ typedef struct request {
 /* Read a state, such as "supine", "prone:rest", "supine:rest+500" or "2600mL". */
 static supine_status read_state(const char *text, void *field, supine_error *error) {
   supine_state *state = field;
-  const supine_status status = supine_state_parse(text, state, error);
-  return status == SUPINE_OK && (state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0)
-             ? supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                                "'%s' cannot be the state of a scan: give rest, full or a volume "
-                                "of both lungs, such as 2600mL",
-                                text)
-             : status;
+  SUPINE_TRY(supine_state_parse(text, state, error));
+  SUPINE_REFUSE_IF(state->volume.kind == SUPINE_VOLUME_SCAN || state->lung_count > 0, error,
+                   SUPINE_ERROR_ARGUMENT,
+                   "'%s' cannot be the state of a scan: give rest, full or a volume of both lungs, "
+                   "such as 2600mL",
+                   text);
+  return SUPINE_OK;
 }
 
 /* Append a further state, such as "prone:PAIRS.csv" or "prone:rest:PRONE.ply", to the request. */

@@ -60,10 +60,11 @@ function bindPosture() {
     state.settle(found.q, found.tilt, 0.7);
     touch();
   });
+  // Replace a typed text that may be invalid.
   $('posture-name').addEventListener('blur', () => {
     last.posture = null;
     redraw();
-  }); // replaces a typed text that may be invalid
+  });
 }
 
 function bindSliders() {
