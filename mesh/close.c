@@ -57,20 +57,12 @@ supine_status supine_mesh_join_close(supine_mesh *mesh, double distance, size_t 
   SUPINE_ARENA arena = {0};
   place *places = supine_arena_take(&arena, mesh->vertex_count, sizeof *places);
   uint32_t *same = supine_arena_take(&arena, mesh->vertex_count, sizeof *same);
-  size_t kept = 0;
   SUPINE_TRY(supine_arena_status(&arena));
   *joined = find_same(mesh, distance, places, same);
   if (*joined == 0) {
     return SUPINE_OK;
   }
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *old = mesh->triangles + 3 * t;
-    const uint32_t corner[3] = {same[old[0]], same[old[1]], same[old[2]]};
-    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-      memcpy(mesh->triangles + 3 * kept++, corner, sizeof corner);
-    }
-  }
-  mesh->triangle_count = kept;
+  (void)supine_mesh_remap(mesh, same);
   (void)supine_mesh_drop_unreferenced(mesh, same);
   return SUPINE_OK;
 }

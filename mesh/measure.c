@@ -42,7 +42,8 @@ double supine_mesh_volume(const supine_mesh *mesh) {
 }
 
 double supine_mesh_spread(const supine_mesh *mesh, size_t begin, size_t end, double spread[3]) {
-  double first[3] = {0.0}; /* integrals of x and x^2, from the tetrahedra to the centre of the box */
+  double first[3] = {
+      0.0}; /* integrals of x and x^2, from the tetrahedra to the centre of the box */
   double second[3] = {0.0};
   double volume = 0.0;
   double low[3];
@@ -64,9 +65,9 @@ double supine_mesh_spread(const supine_mesh *mesh, size_t begin, size_t end, dou
     for (size_t axis = 0; axis < 3; ++axis) {
       const double sum = p[0][axis] + p[1][axis] + p[2][axis];
       first[axis] += tetrahedron * sum / 4.0;
-      second[axis] += tetrahedron / 20.0 *
-                      (p[0][axis] * p[0][axis] + p[1][axis] * p[1][axis] + p[2][axis] * p[2][axis] +
-                       sum * sum);
+      second[axis] +=
+          tetrahedron / 20.0 *
+          (p[0][axis] * p[0][axis] + p[1][axis] * p[1][axis] + p[2][axis] * p[2][axis] + sum * sum);
     }
   }
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -132,6 +133,18 @@ double supine_mesh_turned_over(const supine_mesh *mesh, const double *vertices) 
   return mesh->triangle_count == 0 ? 0.0 : (double)turned / (double)mesh->triangle_count;
 }
 
+void supine_mesh_normalise(size_t count, double *vectors) {
+  for (size_t i = 0; i < count; ++i) {
+    double *v = vectors + 3 * i;
+    const double length = supine_length(v);
+    if (length > 0.0) {
+      for (size_t k = 0; k < 3; ++k) {
+        v[k] /= length;
+      }
+    }
+  }
+}
+
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
   memset(normals, 0, 3 * mesh->vertex_count * sizeof *normals);
   for (size_t t = 0; t < mesh->triangle_count; ++t) {
@@ -142,13 +155,5 @@ void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals) {
       normals[3 * (size_t)corner[k / 3] + k % 3] += normal[k % 3];
     }
   }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) {
-    double *n = normals + 3 * i;
-    const double length = supine_length(n);
-    if (length > 0.0) {
-      for (size_t k = 0; k < 3; ++k) {
-        n[k] /= length;
-      }
-    }
-  }
+  supine_mesh_normalise(mesh->vertex_count, normals);
 }

@@ -147,6 +147,9 @@ void supine_mesh_reverse(const supine_mesh *mesh);
 /** Compute the area of each vertex [vertex_count], mm^2: one third of the area of its triangles. */
 void supine_mesh_vertex_area(const supine_mesh *mesh, double *area);
 
+/** Divide each vector [count, 3] by its length, unless that is 0. */
+void supine_mesh_normalise(size_t count, double *vectors);
+
 /** Compute the unit normal of each vertex [vertex_count, 3]: the normalised mean of the normals of
  * its triangles, weighted by area. It is 0 where the mean is 0. */
 void supine_mesh_vertex_normals(const supine_mesh *mesh, double *normals);

@@ -7,18 +7,6 @@
 
 #include "mesh/mesh.h"
 
-static void normalise_all(size_t count, double *vectors) {
-  for (size_t i = 0; i < count; ++i) {
-    double *v = vectors + 3 * i;
-    const double length = supine_length(v);
-    if (length > 0.0) {
-      for (size_t k = 0; k < 3; ++k) {
-        v[k] /= length;
-      }
-    }
-  }
-}
-
 void supine_mesh_smooth_normals(const supine_mesh *mesh, const supine_topology *topology,
                                 double *normals, double *space) {
   enum { ROUNDS = 10 };
@@ -34,7 +22,7 @@ void supine_mesh_smooth_normals(const supine_mesh *mesh, const supine_topology *
         normals[b + k] += space[a + k];
       }
     }
-    normalise_all(n, normals);
+    supine_mesh_normalise(n, normals);
   }
 }
 

@@ -233,6 +233,20 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
   return mend_links(mesh, sides, report);
 }
 
+size_t supine_mesh_remap(supine_mesh *mesh, const uint32_t *remap) {
+  size_t kept = 0;
+  for (size_t t = 0; t < mesh->triangle_count; ++t) {
+    const uint32_t *old = mesh->triangles + 3 * t;
+    const uint32_t corner[3] = {remap[old[0]], remap[old[1]], remap[old[2]]};
+    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+      memcpy(mesh->triangles + 3 * kept++, corner, sizeof corner);
+    }
+  }
+  const size_t dropped = mesh->triangle_count - kept;
+  mesh->triangle_count = kept;
+  return dropped;
+}
+
 size_t supine_mesh_drop_unreferenced(supine_mesh *mesh, uint32_t *space) {
   const size_t corners = 3 * mesh->triangle_count;
   size_t kept = 0;

@@ -22,6 +22,10 @@ supine_status supine_mesh_repair(supine_mesh *mesh, supine_mesh_repair_report *r
  * @param joined  output: number of vertices that were joined with a lower one */
 supine_status supine_mesh_join_close(supine_mesh *mesh, double distance, size_t *joined);
 
+/** Replace each corner of the triangles, v, by remap[v], and drop the triangles that then have equal
+ * corners. Return the number of dropped triangles. */
+size_t supine_mesh_remap(supine_mesh *mesh, const uint32_t *remap);
+
 /** Drop vertices that are in no triangle, and keep the order of the others. Return the number of
  * dropped vertices.
  * @param space  [vertex_count] work space */

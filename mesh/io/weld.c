@@ -45,18 +45,6 @@ static size_t join(supine_mesh *mesh, uint32_t *remap, uint32_t *slots, size_t s
   return kept;
 }
 
-static size_t drop_degenerate(supine_mesh *mesh, const uint32_t *remap) {
-  size_t kept = 0;
-  for (size_t t = 0; t < mesh->triangle_count; ++t) {
-    const uint32_t *old = mesh->triangles + 3 * t;
-    const uint32_t corner[3] = {remap[old[0]], remap[old[1]], remap[old[2]]};
-    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-      memcpy(mesh->triangles + 3 * kept++, corner, sizeof corner);
-    }
-  }
-  return kept;
-}
-
 supine_status supine_io_weld(supine_mesh *mesh, supine_mesh_report *report) {
   size_t slot_count = 16;
   while (slot_count < 2 * mesh->vertex_count) {
@@ -68,11 +56,8 @@ supine_status supine_io_weld(supine_mesh *mesh, supine_mesh_report *report) {
   SUPINE_TRY(supine_arena_status(&arena));
   memset(slots, 0xFF, slot_count * sizeof *slots);
 
-  size_t kept = join(mesh, remap, slots, slot_count);
-  mesh->vertex_count = kept;
-  kept = drop_degenerate(mesh, remap);
-  report->degenerate_faces += mesh->triangle_count - kept;
-  mesh->triangle_count = kept;
+  mesh->vertex_count = join(mesh, remap, slots, slot_count);
+  report->degenerate_faces += supine_mesh_remap(mesh, remap);
   report->unreferenced_vertices += supine_mesh_drop_unreferenced(mesh, remap);
   return SUPINE_OK;
 }
