@@ -303,7 +303,7 @@ CASES = {
     "labels-order": (lambda: mapped(lobes((1, 2, 3, 4, 5))), lambda: mapped(lobes((4, 5, 1, 2, 3))), "refused"),
     "lung-pieces": (lambda: mapped(sides, labels="left=1,right=2"), lambda: mapped(bed(), labels="left=1,right=2"),
                     "told"),
-    "lung-cut": (lambda: mapped(sides), lambda: mapped(sides[6:]), "told"),
+    "lung-cut": (lambda: mapped(sides), lambda: mapped(sides[24:]), "told"),
     "lung-hollow": (lambda: made("lungs.ply"), lambda: made("hollow.ply"), "refused"),
     "lungs-level": (lambda: made("lungs.ply"), lambda: made("apart.ply"), "told"),
     "voxels-begin": (lambda: nifti(352), lambda: nifti(0), "refused"),
