@@ -161,8 +161,13 @@ static void add_fields(entries *list, const double *scan_gravity, const supine_c
                        const supine_simulated_volumes *simulated) {
   const double *g = scan_gravity;
   const supine_clusters *clusters = &computed->clusters;
+  const double size = supine_fields_size(&computed->fit);
   add(list, "route", "fields");
   add(list, "error_method", "leave-one-out");
+  add(list, "error_between_percent", "%.6g", 100.0 * computed->errors.between_mm / size);
+  add(list, "error_gap_percent", "%.6g", 100.0 * computed->errors.gap_mm / size);
+  add(list, "error_between_mm", "%.6g", computed->errors.between_mm);
+  add(list, "error_gap_mm", "%.6g", computed->errors.gap_mm);
   if (computed->compression.order > 0) {
     add(list, "simulated_total_ml", "%.17g,%.17g", simulated->total[0], simulated->total[1]);
     add(list, "simulated_runs", "%zu", computed->fit.fields->run_count);
@@ -286,7 +291,7 @@ static void add_all(entries *list, const supine_prepared *prepared,
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 26 };
+enum { TENSORS_MAX = 27 };
 
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
 static supine_tensor list_coefficients(const supine_computed *computed,
@@ -307,6 +312,7 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
   const supine_compression *field = &made->field;
   const supine_volume_forms *forms = &computed->forms;
   const supine_error_table *table = &computed->table;
+  const supine_fit_errors *e = &computed->errors;
   const size_t bands = table->band_count;
   const size_t modes = table->mode_count;
   const size_t n = lungs->mesh.vertex_count;
@@ -342,7 +348,8 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"volume_range", SUPINE_F64, 3, {SUPINE_RANGE_NODES, g, 2}, made->volume_range},
       {"error_harmonics", SUPINE_F64, 1, {bands}, bands > 0 ? table->harmonics : NULL},
       {"error_modes", SUPINE_F64, 1, {modes}, modes > 0 ? table->modes : NULL},
-      {"error_vertices", SUPINE_F32, 1, {n}, computed->vertex_error},
+      {"error_vertices", SUPINE_F32, 1, {n}, e->vertices},
+      {"error_gravity", SUPINE_F64, 2, {e->rows, e->terms}, e->harmonics},
       {"error_share", SUPINE_F32, 1, {n}, computed->error_share},
       {"landmarks", SUPINE_F32, 2, {computed->landmark_count, 4}, computed->landmarks},
       {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},

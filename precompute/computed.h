@@ -59,7 +59,7 @@ typedef struct supine_computed {
   supine_fit fit;
   supine_fields counted;    /**< the fields over volume, counted from the scan, or empty */
   supine_clusters clusters; /**< `count` is 0 if the basis stores modes */
-  float *vertex_error;      /**< [N] RMS error of each vertex in runs left out, mm; or NULL */
+  supine_fit_errors errors; /**< errors of states between the runs */
   float *exact;             /**< coefficients of `compression` before clusters, or NULL */
   supine_arena memory;
 } supine_computed;

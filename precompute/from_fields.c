@@ -89,8 +89,13 @@ supine_status supine_precompute_from_fields(const supine_prepared *prepared,
                                             &computed->field.rows, &computed->forms, error));
   SUPINE_TRY(supine_precompute_tell_progress(choice, 4, error));
   const size_t n = computed->lungs.mesh.vertex_count;
-  computed->vertex_error = supine_arena_take(&computed->memory, n, sizeof(float));
+  supine_fit_errors *errors = &computed->errors;
+  errors->rows = 2 * computed->fit.report.band + 4;
+  errors->terms = supine_sh_count(computed->fit.report.band + 1);
+  errors->vertices = supine_arena_take(&computed->memory, n, sizeof(float));
+  errors->harmonics =
+      supine_arena_zeros(&computed->memory, errors->rows * errors->terms, sizeof(double));
   SUPINE_TRY(supine_arena_check(&computed->memory, error, "%zu vertices", n));
   return supine_fields_measure(&computed->fit, choice->modes == 0 ? 0 : compression->mode_count,
-                               &computed->accuracy, computed->vertex_error, error);
+                               &computed->accuracy, errors, error);
 }

@@ -183,8 +183,11 @@ supine_status supine_precompute_measure_stored(const supine_prepared *prepared, 
   if (computed->exact != NULL) {
     exact.coefficients = computed->exact;
   }
-  SUPINE_TRY(supine_projection_accuracy_add_storage(basis, &exact, &stored->rows,
-                                                    &computed->accuracy, computed->vertex_error));
+  SUPINE_TRY(supine_projection_accuracy_add_storage(
+      basis, &exact, &stored->rows, &computed->accuracy, computed->errors.vertices));
+  if (computed->errors.vertices != NULL) {
+    supine_fields_complete_errors(computed->lungs.mesh.vertex_count, &computed->errors);
+  }
   SUPINE_TRY(measure_turning(basis, &computed->accuracy, error));
   if (computed->compression.order > 0) { /* the simulations give the range of volumes */
     return name_volumes(basis, &prepared->named, stored, error);

@@ -571,7 +571,7 @@ static supine_status check_landmarks(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
-/* Check the optional tensor 'error_vertices' of another simulator's fields. */
+/* Check the optional tensors 'error_vertices' and 'error_gravity' of another simulator's fields. */
 static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
   size_t n = basis->info.vertex_count;
   if (!basis->info.is_fields || supine_safetensors_find(c->file, "error_vertices") == NULL) {
@@ -584,6 +584,15 @@ static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
                     (double)basis->vertex_error[i], i);
     }
   }
+  if (supine_safetensors_find(c->file, "error_gravity") == NULL) {
+    return SUPINE_OK;
+  }
+  const size_t band = basis->info.band;
+  size_t shape[] = {2 * band + 4, supine_sh_count(band + 1)};
+  if (band > FIT_BAND_MAX) {
+    return refuse(c, "tensor 'error_gravity' belongs to band %zu, above %d", band, FIT_BAND_MAX);
+  }
+  REQUIRE(basis->error_gravity, c, "error_gravity", SUPINE_F64, 2, shape);
   return SUPINE_OK;
 }
 

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <supine/sh.h>
+
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/vec3.h"
@@ -499,22 +501,44 @@ static bool is_same(const supine_basis *basis, const supine_pose *a, const supin
   return apart == 0;
 }
 
-/* Write the errors of a fit to another simulator's fields, which do not depend on the state. The
- * errors of two states are taken as independent; the surface of the scan has none.
+/* Return the error of a fit to another simulator's fields in a direction of gravity, divided by its
+ * RMS over all directions: |E y|, or 1 if the file does not say. */
+static double error_along(const supine_basis *basis, const double gravity[3]) {
+  double y[(FIT_BAND_MAX + 2) * (FIT_BAND_MAX + 2)];
+  const size_t band = basis->info.band;
+  const size_t count = supine_sh_count(band + 1);
+  double square = 0;
+  if (basis->error_gravity == NULL) {
+    return 1;
+  }
+  (void)supine_sh_evaluate(band + 1, gravity, y); /* supine_basis_pose has accepted the vector */
+  for (size_t row = 0; row < 2 * band + 4; ++row) {
+    double part = 0;
+    for (size_t t = 0; t < count; ++t) {
+      part += basis->error_gravity[row * count + t] * y[t];
+    }
+    square += part * part;
+  }
+  return sqrt(square);
+}
+
+/* Write the errors of a fit to another simulator's fields. The errors of two states are taken as
+ * independent; the surface of the scan has none.
  * @param from  NULL for the state of the scan */
-static supine_status evaluate_fields(const supine_basis *basis, const supine_pose *pose,
-                                     const supine_state *from, float *sigma, supine_error *error) {
-  float factor = 1;
+static supine_status evaluate_fields(const supine_basis *basis, const supine_state *state,
+                                     const supine_pose *pose, const supine_state *from,
+                                     float *sigma, supine_error *error) {
   if (basis->vertex_error == NULL) {
     return refuse_fields(basis, error);
   }
+  double factor = error_along(basis, state->gravity);
   if (from != NULL && !supine_basis_is_scan(basis, from)) {
     supine_pose other;
     SUPINE_TRY(supine_basis_pose(basis, from, &other, error));
-    factor = is_same(basis, pose, &other) ? 0 : (float)sqrt(2);
+    factor = is_same(basis, pose, &other) ? 0 : hypot(factor, error_along(basis, from->gravity));
   }
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
-    sigma[i] = factor * basis->vertex_error[i];
+    sigma[i] = (float)(factor * (double)basis->vertex_error[i]);
   }
   return SUPINE_OK;
 }
@@ -543,7 +567,7 @@ supine_status supine_expected_error(const supine_basis *basis, const supine_stat
   supine_pose pose;
   SUPINE_TRY(supine_basis_pose(basis, state, &pose, error)); /* refuses impossible volumes */
   if (supine_basis_get_info(basis)->is_fields) {
-    return evaluate_fields(basis, &pose, from, sigma, error);
+    return evaluate_fields(basis, state, &pose, from, sigma, error);
   }
   return evaluate_all(basis, state, from, sigma, mean, error);
 }

@@ -15,7 +15,7 @@
 enum { RESTING_TERMS = 9 };
 
 /* Highest degree of the harmonics of simulated limits. */
-enum { LIMIT_BAND_MAX = 11 };
+enum { LIMIT_BAND_MAX = 11, FIT_BAND_MAX = 11 };
 
 /** Sizes above which positions are written with stores that bypass the caches. One pose must exceed
  * both STREAM_BYTES and STREAM_RANGE. */
@@ -91,9 +91,12 @@ struct supine_basis {
   /** [SUPINE_RANGE_NODES, lung_count, 2] least and largest volume of each lung, mL (checks.h); NULL
    * if the file has none */
   const double *volume_range;
-  /** [vertices] RMS error of the fit to another simulator's fields in runs left out, mm; NULL if
-   * the file has none */
+  /** [vertices] RMS error of the fit to another simulator's fields over all directions of gravity,
+   * mm; NULL if the file has none */
   const float *vertex_error;
+  /** [2 L + 4, (L + 2)^2] harmonics E of the direction of gravity: there, the error is |E y| times
+   * that; NULL if the file has none */
+  const double *error_gravity;
   /** [vertices] variance that a fit's landmarks leave, divided by its mean at points that were held
    * out; NULL if the file has none */
   const float *error_share;

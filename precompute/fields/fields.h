@@ -10,8 +10,8 @@
  * The band and the order of a fit are the highest degrees of its harmonics and of its polynomials.
  * By default they are chosen by the error of runs that are left out: each run alone, and the runs
  * of one volume between the smallest and the largest. More terms are chosen if they reduce this
- * error by more than 1 %, and do not raise the error that is stated. This leaves out all runs of a
- * direction in place of each run alone. */
+ * error by more than 1 %, and do not raise the error with all runs of a direction left out in place
+ * of each run alone. */
 #ifndef SUPINE_FIELDS_H
 #define SUPINE_FIELDS_H
 
@@ -128,12 +128,33 @@ double supine_fields_size(const supine_fit *fit);
 supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *field,
                                   supine_error *error);
 
+/** Errors of a fit to band L in states between the runs (errors.c). */
+typedef struct supine_fit_errors {
+  float *vertices; /**< [vertices] RMS error of each vertex over all directions of gravity, mm */
+  double gravity_part; /**< mean over the vertices of the part of its square that depends on the
+                            direction of gravity, mm^2 */
+  size_t rows, terms;  /**< 2 L + 4 and (L + 2)^2 */
+  /** [rows, terms] harmonics E of the direction of gravity, to degree L + 1: the error in the
+   * direction g is |E y(g)| times that in `vertices`; the mean of |E y|^2 over all directions is 1
+   */
+  double *harmonics;
+  double between_mm; /**< RMS of `vertices` */
+  double gap_mm;     /**< that in the direction of gravity where it is largest, in a gap between the
+                          directions of the runs */
+} supine_fit_errors;
+
 /** Measure the errors of a basis of the fit: each run predicted from the others, in mm and relative
- * to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume.
- * @param modes     number of modes of the basis, or 0 if it has the harmonics themselves
- * @param vertices  [vertices] RMS error of each vertex over the runs, mm, written */
+ * to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume. Derive the
+ * errors of states between the runs.
+ * @param modes   number of modes of the basis, or 0 if it has the harmonics themselves
+ * @param errors  its members `vertices` and `gravity_part` are written;
+ * supine_fields_complete_errors completes `harmonics` */
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
-                                    float *vertices, supine_error *error);
+                                    supine_fit_errors *errors, supine_error *error);
+
+/** Complete the errors of a fit, when `vertices` has the error of storage too, which is the same in
+ * all directions. */
+void supine_fields_complete_errors(size_t vertex_count, supine_fit_errors *errors);
 
 /** Refuse a posture in which a lung was not simulated at the volume of the given surface.
  * @param fit      of order 1 or more

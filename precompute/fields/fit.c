@@ -7,12 +7,10 @@
 
 #include "base/arena.h"
 #include "base/remedy.h"
-#include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/fields/frame.h"
 #include "precompute/fields/suspects.h"
 #include "precompute/fields/volumes.h"
-#include "precompute/projection/tally.h"
 
 /* More terms replace the chosen ones if their error is below `worthwhile` times that of the chosen
  * ones. A chosen fit with an error of at most `exact` is kept, because such an error is rounding
@@ -117,7 +115,7 @@ typedef struct choice {
   int wanted;         /* band, or negative */
   size_t order_least; /* lower orders are only compared */
   double least;       /* error of the chosen fit in single runs and inner volumes */
-  double stated;      /* its error in whole directions and inner volumes */
+  double whole;       /* its error in whole directions and inner volumes */
   /* Relative errors of inner volumes that were left out; 0 if the others do not determine them. */
   double inner[SUPINE_FIT_ORDER_MAX + 1][SUPINE_FIT_BAND_MAX + 1];
 } choice;
@@ -148,9 +146,8 @@ static supine_status leave_out_volumes(const supine_fit *fit, choice *c, const s
 }
 
 /* Fit up to a band and an order. Choose the fit if it is wanted or clearly better, by the errors of
- * single runs and of inner volumes. The error that is stated has whole directions in place of
- * single runs, because states between the runs have other directions; it must not grow, as it does
- * where the harmonics are almost as many as the directions.
+ * single runs and of inner volumes. The error with whole directions in place of single runs must
+ * not grow, as it does where the harmonics are almost as many as the directions.
  * @param determined  written: whether the runs determine this fit */
 static supine_status try_fit(supine_fit *fit, choice *c, size_t band, size_t order,
                              bool *determined) {
@@ -181,11 +178,11 @@ static supine_status try_fit(supine_fit *fit, choice *c, size_t band, size_t ord
   const double error = relative_error(add_sums(each, volumes));
   report->error[order][band] = between > 0.0 ? hypot(relative_error(whole), between)
                                              : relative_error(add_sums(whole, volumes));
-  const double stated = report->error[order][band];
-  const bool better = error < worthwhile * c->least && stated <= c->stated;
+  const double in_directions = report->error[order][band];
+  const bool better = error < worthwhile * c->least && in_directions <= c->whole;
   if ((c->wanted < 0 || (size_t)c->wanted == band) && better && c->least > exact) {
     c->least = error;
-    c->stated = stated;
+    c->whole = in_directions;
     fit->chosen = trial;
     report->band = band;
     report->order = order;
@@ -241,7 +238,7 @@ static supine_status choose(supine_fit *fit, int wanted, supine_error *error) {
               .wanted = wanted,
               .order_least = levels > 1 ? 1 : 0,
               .least = INFINITY,
-              .stated = INFINITY};
+              .whole = INFINITY};
   size_t highest = 0; /* band that the runs determine with any order, plus 1 */
   fit->inner_groups = fit->groups.count - fit->direction_groups;
   for (size_t order = 0; order <= order_most; ++order) {
@@ -315,82 +312,5 @@ supine_status supine_fields_field(const supine_fit *fit, supine_gravity_field *f
                 fit->chosen.pinv + lung * terms * (size_t)m, m, 0.0,
                 made->columns + 3 * begin * terms, (int)terms);
   }
-  return SUPINE_OK;
-}
-
-/* Errors of runs that were left out. */
-typedef struct left_errors {
-  supine_tally *tally;
-  double *square; /* [vertices] sum over the runs of the squared error, mm^2 */
-  double *run;    /* [vertices, 3] work space: errors in one run, mm */
-} left_errors;
-
-/* Add the errors of the vertices of one lung in a run that was left out. */
-static void tally_run(const supine_fit *fit, size_t lung, const double *residual,
-                      left_errors *errors) {
-  const int m = (int)fit->fields->run_count;
-  const size_t begin = fit->lungs->lung_begin[lung];
-  const size_t width = 3 * (fit->lungs->lung_begin[lung + 1] - begin);
-  cblas_dgemv(CblasRowMajor, CblasTrans, m, (int)width, 1.0, fit->fields->displacement + 3 * begin,
-              3 * (int)fit->fields->vertex_count, residual, 1, 0.0, errors->run, 1);
-  for (size_t i = 0; i < width; i += 3) {
-    const double length = supine_length(errors->run + i);
-    supine_projection_tally_add(errors->tally, 1, &length);
-    errors->square[begin + i / 3] += length * length;
-  }
-}
-
-/* Predict each run from the others, and add its errors. */
-static supine_status leave_out(const supine_fit *fit, size_t modes, left_errors *errors,
-                               supine_error *error) {
-  const size_t m = fit->fields->run_count;
-  const size_t parts = fit->lungs->lung_count;
-  const supine_run_groups *groups = &fit->groups;
-  SUPINE_ARENA arena = {0};
-  double *residual = supine_arena_take(&arena, parts * m * m, sizeof *residual);
-  double *square = supine_arena_take(&arena, m, sizeof *square);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu runs", m));
-  for (size_t group = 0; group < groups->count; ++group) {
-    const size_t count = groups->begin[group + 1] - groups->begin[group];
-    const supine_status status = supine_fields_regression_predict(
-        &fit->chosen, groups, group, fit->gram, modes, residual, square);
-    SUPINE_REFUSE_IF(status != SUPINE_OK, error, status, "cross-validation: %s",
-                     supine_status_string(status));
-    for (size_t row = 0; row < parts * count; ++row) {
-      tally_run(fit, row / count, residual + row * m, errors);
-    }
-  }
-  return SUPINE_OK;
-}
-
-supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
-                                    float *vertices, supine_error *error) {
-  const size_t n = fit->fields->vertex_count;
-  const size_t left = fit->groups.begin[fit->groups.count]; /* runs, some of them twice */
-  SUPINE_ARENA arena = {0};
-  supine_tally *tally = supine_arena_zeros(&arena, 1, sizeof *tally);
-  left_errors errors = {.tally = tally};
-  errors.square = supine_arena_zeros(&arena, n, sizeof *errors.square);
-  errors.run = supine_arena_take(&arena, 3 * n, sizeof *errors.run);
-  SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
-  SUPINE_TRY(leave_out(fit, modes, &errors, error));
-  const double size = supine_fields_size(fit);
-  double between = 1.0; /* factor for errors between the volumes */
-  *accuracy = (supine_accuracy){.direction_count = left,
-                                .rms_mm = sqrt(tally->square_sum / (double)tally->count),
-                                .p95_mm = supine_projection_tally_percentile(tally, 0.95),
-                                .max_mm = tally->largest};
-  if (fit->report.between > 0.0) { /* directions were left out, but no volumes: add their error */
-    const double directions = accuracy->rms_mm;
-    accuracy->rms_mm = hypot(directions, fit->report.between * size);
-    between = directions > 0.0 ? accuracy->rms_mm / directions : 1.0;
-    accuracy->p95_mm *= between;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    vertices[i] = (float)(between * sqrt(errors.square[i] / (double)left));
-  }
-  accuracy->relative_rms = accuracy->rms_mm / size;
-  accuracy->relative_p95 = accuracy->p95_mm / size;
-  accuracy->relative_max = accuracy->max_mm / size;
   return SUPINE_OK;
 }

@@ -116,8 +116,7 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                               .allow_folds = wanted->volume.allow_folds,
                               .subtract_hilum = wanted->frame.hilum,
                               .registered = wanted->frame.points != NULL};
-  static const char simulator[] = "expected_error_mm: of the fit to the other simulator, RMS over "
-                                  "runs left out; ";
+  static const char simulator[] = "expected_error_mm: of the fit to the other simulator; ";
   const char *by = "";
   char comment[384 + SUPINE_CAVEATS_SIZE];
   char caveats[SUPINE_CAVEATS_SIZE];
@@ -355,7 +354,7 @@ const supine_command supine_command_deform = {
         "another_day_error_mm; and that of its displacement, moved_error_mm, which counts from "
         "the state of --from. Each is " SUPINE_EXPECTED_MEANING ". " SUPINE_EXPECTED_SUPPORT
         "\nOn a surface made with --fields, expected_error_mm is the error of the fit to the other "
-        "simulator, RMS over runs left out.",
+        "simulator, larger in gaps between its directions of gravity.",
     .options = table,
     .notes =
         "Examples:\n"

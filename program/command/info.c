@@ -39,12 +39,16 @@ static const char *const errors[] = {"error_directions",
                                      "error_rms_percent",
                                      "error_p95_percent",
                                      "error_max_percent",
+                                     "error_between_percent",
+                                     "error_gap_percent",
                                      "error_turning_rms_percent",
                                      "error_volume_ml",
                                      "error_rest_part",
                                      "error_rms_mm",
                                      "error_p95_mm",
-                                     "error_max_mm"};
+                                     "error_max_mm",
+                                     "error_between_mm",
+                                     "error_gap_mm"};
 
 /* Add the value of a metadata key to a JSON object, as a number if possible; skip missing keys. */
 static void add_fact(json_t *object, const char *name, const supine_basis *basis, const char *key) {

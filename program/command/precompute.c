@@ -169,6 +169,25 @@ static void print_report(const request *wanted, const supine_prepared *prepared,
   print_errors(report, ", at ", state);
 }
 
+/* Return a number that the basis states about itself. */
+static double stated_number(const supine_basis *basis, const char *key) {
+  double value = 0.0;
+  (void)supine_options_parse_number(supine_basis_metadata(basis, key), &value);
+  return value;
+}
+
+/* Print what the runs that were left out say of other states: over all directions of gravity, and
+ * in the direction farthest from those of the runs. */
+static void print_between(const supine_basis *basis) {
+  supine_options_line("states between the runs: %.3g %%, %s mm RMS over all directions of gravity; "
+                      "in the largest gap\n"
+                      "between the directions: %.3g %%, %s mm RMS\n",
+                      stated_number(basis, "error_between_percent"),
+                      supine_text_distance(stated_number(basis, "error_between_mm")).text,
+                      stated_number(basis, "error_gap_percent"),
+                      supine_text_distance(stated_number(basis, "error_gap_mm")).text);
+}
+
 /* Print the highest band (degree) of spherical harmonics that the given directions of gravity
  * determine, and the leave-one-out error of each band. */
 static void print_fit(const request *wanted, const supine_prepared *prepared,
@@ -216,6 +235,7 @@ static void print_fit(const request *wanted, const supine_prepared *prepared,
   supine_options_line("error of the basis, each direction%s predicted from the others:\n",
                       report->volume_count > 2 ? " and each inner volume" : "");
   print_errors(report, "", "");
+  print_between(basis);
   if (report->six_volumes > 0.0) {
     supine_options_line(
         "between the volumes: about %.2g %% RMS; six volumes for each direction would "

@@ -393,6 +393,11 @@ static void add_volumes(const fixture *f, tensors *t) {
   if (f->vertex_error != NULL) {
     add_tensor(t, (supine_tensor){"error_vertices", SUPINE_F32, 1, {f->vertices}, f->vertex_error});
   }
+  if (f->error_gravity != NULL) {
+    const size_t shape[] = {2 * f->band + 4, (f->band + 2) * (f->band + 2)};
+    add_tensor(
+        t, (supine_tensor){"error_gravity", SUPINE_F64, 2, {shape[0], shape[1]}, f->error_gravity});
+  }
   if (f->held != NULL) {
     add_tensor(t, (supine_tensor){"volume_range", SUPINE_F64, 3, {27, g, 2}, f->held});
   }

@@ -44,9 +44,10 @@ typedef struct fixture {
   /* Volumes of another simulator, mL above the reference surface, if `orders` is above 1 */
   double range[17][2], limits[17][2][9], shares[17][9][2];
   double total[2];
-  const double *full;        /* [lungs, 9] volume at full inflation, or NULL */
-  const float *vertex_error; /* [vertices] mm (tensor 'error_vertices'), or NULL */
-  const float *error_share;  /* [vertices] (tensor 'error_share'), or NULL */
+  const double *full;          /* [lungs, 9] volume at full inflation, or NULL */
+  const float *vertex_error;   /* [vertices] mm (tensor 'error_vertices'), or NULL */
+  const double *error_gravity; /* [2 band + 4, (band + 2)^2] (tensor 'error_gravity'), or NULL */
+  const float *error_share;    /* [vertices] (tensor 'error_share'), or NULL */
   size_t landmark_count;
   const float *landmarks; /* [landmark_count, 4] (tensor 'landmarks'), or NULL */
   const double *held;     /* [27, lungs, 2] volumes that the lungs can hold, mL, or NULL */

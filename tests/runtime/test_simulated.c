@@ -488,6 +488,32 @@ TEST(test_open_wrong_simulated_volumes_refused_with_reason) {
   end();
 }
 
+/* Write errors that are 1.5 times those stored, but sqrt(1.5^2 + (2 z)^2) times along z, and assert
+ * that both are stated, and combined for a displacement. Y(0, 0) is sqrt(1 / (4 pi)), and Y(1, 0)
+ * is sqrt(3 / (4 pi)) z; index 2. */
+static void check_error_along_gravity(void) {
+  enum { BAND = 1, ROWS = 2 * BAND + 4, TERMS = (BAND + 2) * (BAND + 2) };
+  double harmonics[ROWS][TERMS] = {{1.5 * 3.5449077018110321}};
+  float sigma[60];
+  harmonics[3][2] = 2 * 2.0466534158929770;
+  f->error_gravity = &harmonics[0][0];
+  open_again();
+  const supine_state across = state_of((const double[3]){0, 1, 0}, SUPINE_VOLUME_SCAN, 12);
+  const supine_state along = state_of((const double[3]){0, 0, -1}, SUPINE_VOLUME_SCAN, 12);
+  const supine_state *from[] = {NULL, &across};
+  static const double factor[] = {2.5, 2.9154759474226504}; /* sqrt(2.5^2 + 1.5^2) */
+  for (size_t k = 0; k < 2; ++k) {
+    assert_int_equal(supine_expected_error(basis, &along, from[k], sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < 60; ++i) {
+      assert_true(fabs((double)sigma[i] - factor[k] * (double)f->vertex_error[i]) < 1e-6);
+    }
+  }
+  harmonics[1][1] = NAN;
+  assert_refused("tensor 'error_gravity' has a number that is not finite");
+  f->error_gravity = NULL;
+  open_again();
+}
+
 TEST(test_expected_error_simulated_is_stored_error) {
   begin();
   enum { N = 60 };
@@ -516,6 +542,7 @@ TEST(test_expected_error_simulated_is_stored_error) {
   const supine_state beyond = state_of(oblique, SUPINE_VOLUME_ABSOLUTE, 9e4);
   assert_int_equal(supine_expected_error(basis, &beyond, NULL, sigma, &error),
                    SUPINE_ERROR_NUMERICAL);
+  check_error_along_gravity();
   stored[7] = -1e-3F;
   assert_refused("tensor 'error_vertices' has -0.001 mm at vertex 7, below 0");
   f->vertex_error = NULL;

@@ -377,7 +377,11 @@ static supine_status add_tensors(page *p) {
     SUPINE_TRY(add_rows(p, "coefficients", info, axes_of(info), info->mode_count, coefficient_row));
   }
   if (info->is_fields && supine_basis_tensor(p->basis, "error_vertices") != NULL) {
+    const supine_tensor *gravity = supine_basis_tensor(p->basis, "error_gravity");
     SUPINE_TRY(add_rows(p, "error_vertices", info, 1, 1, error_row));
+    if (gravity != NULL) {
+      SUPINE_TRY(add_doubles(p, "error_gravity", gravity));
+    }
   }
   SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],
                          p->order.vertex_count));

@@ -186,6 +186,8 @@ function takeSurface(basis) {
   if (basis.fitErrors) {
     const counts = takeCounts('error_vertices', n, 1);
     tensors.error_vertices = [[n], Float32Array.from({ length: n }, (_, v) => basis.errorUnit * counts[2 * v])];
+    const harmonics = takeTensor('error_gravity', Float64Array);
+    tensors.error_gravity = [[2 * basis.band + 4, (basis.band + 2) ** 2], harmonics];
   }
   return tensors;
 }

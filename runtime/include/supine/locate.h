@@ -95,10 +95,12 @@ typedef enum supine_expected_term {
 /** Compute the expected error of every vertex in a state: of its position if `from` is NULL, or of
  * its displacement from the state `from`.
  *
- * In a basis of another simulator's fields, the error is that of the fit: the RMS, over runs that
- * are left out, of what the others do not predict at the vertex, tensor "error_vertices". It is the
- * same in all states, sqrt(2) of that between two states, and says nothing of how well the
- * simulator describes a person.
+ * In a basis of another simulator's fields, the error is that of the fit, and says nothing of how
+ * well the simulator describes a person. It follows from runs that are left out: at a vertex, over
+ * all directions of gravity, it is that of the tensor "error_vertices"; with gravity g it is
+ * |E y(g)| times as large, where y has the harmonics of g to degree L + 1, and E is the tensor
+ * "error_gravity" [2 L + 4, (L + 2)^2]. This is least near the directions of the runs and largest
+ * in the gaps between them. The errors of two states are independent.
  *
  * Full inflation was assumed if the file was scanned at rest, and the volume at rest if it was not;
  * neither was, if the file has metadata "resting_known". Cost: up to eight evaluations of every
