@@ -106,7 +106,7 @@ static supine_status check_directions(const checking *c) {
     supine_findings_warn(
         c->findings,
         "%s: the directions of gravity leave a gap: there is none within %.0f degrees of "
-        "%.2f,%.2f,%.2f (LPS). There, errors are several times the stated ones: simulate "
+        "%.2f,%.2f,%.2f (LPS). There, errors are several times those elsewhere: simulate "
         "directions in the gap",
         c->name, gap, middle[0], middle[1], middle[2]);
   }

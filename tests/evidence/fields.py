@@ -15,7 +15,7 @@ in the middle of the holes of the plan, for all vertices and for each. Then righ
 measured as the checks of runs, points, units and axes measure them: the law of each map (at rest from two origins, and
 at five volumes), formulas on its surface (nonlinear in gravity and volume, one of them with a lung that opens late),
 and CalculiX where it is installed (tests/evidence/fem.py). The limits of these checks, and how stated errors follow
-from the runs, were chosen on these sets, but for the last two of CalculiX and the law of a second map."""
+from the runs, were chosen on these sets, but for the last two of CalculiX."""
 import itertools
 import os
 import pathlib
