@@ -224,7 +224,7 @@ MISTAKES = {
     "frame": (write_image, ".nrrd", {  # an image of which only the grid of voxels counts
         RIGHT: ct, "unit": with_part(ct, step=ct["step"] / 1000, origin=ct["origin"] / 1000),
         "axes": with_part(ct, origin=ct["origin"] * RAS, step=ct["step"] * RAS),
-        "shifted": with_part(ct, origin=ct["origin"] + [0, 0, 150])}),
+        "shifted": with_part(ct, origin=ct["origin"] + [0, 0, 300])}),
     "fields": (write_fields, ".fields.st", {
         RIGHT: field, "unit": {**field, "displacement": field["displacement"] / 1000},
         "axes": {**field, "displacement": field["displacement"] * RAS},

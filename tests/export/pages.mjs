@@ -25,7 +25,12 @@ const all = [
 ];
 for (const name of process.argv.length > 2 ? process.argv.slice(2) : all) {
   const begin = performance.now();
-  await import(`./${name}.mjs`);
-  console.log(`${name}: passed in ${((performance.now() - begin) / 1000).toFixed(1)} s`);
+  try {
+    await import(`./${name}.mjs`);
+    console.log(`${name}: passed in ${((performance.now() - begin) / 1000).toFixed(1)} s`);
+  } catch (error) {
+    console.error(`${name}: failed\n`, error);
+    process.exitCode = 1;
+  }
 }
 await browser.close();

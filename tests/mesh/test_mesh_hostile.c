@@ -360,7 +360,7 @@ TEST_FULL(test_load_known_files_of_assimp_expected_counts) {
       {"STL/triangle_with_empty_solid.stl", SUPINE_OK, 3, 1},
       {"OFF/Wuson.off", SUPINE_OK, 2117, 3732},
       {"OFF/Cube.off", SUPINE_OK, 8, 12},
-      {"OFF/invalid.off", SUPINE_ERROR_MESH, 0, 0},
+      {"OFF/invalid.off", SUPINE_ERROR_FORMAT, 0, 0}, /* a line ends in CR alone */
       {"OBJ/WusonOBJ.obj", SUPINE_OK, 2117, 3732},
       {"OBJ/box_without_lineending.obj", SUPINE_OK, 8, 12},
       {"OBJ/concave_polygon.obj", SUPINE_OK, 64, 64},

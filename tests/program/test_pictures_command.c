@@ -748,9 +748,9 @@ TEST(test_render_film_stops_at_each_posture) {
   if (!render("lungs.safetensors --posture supine,left,prone --size 200x180 -o film.webp")) {
     skip();
   }
-  free(read_frame("film.webp", 36, &info, &time));
-  assert_int_equal(info.frame_count, 37); /* the first, and 18 for each turn of 1.2 s */
-  assert_int_equal(time, 35 * 66 + 2 * 1000);
+  free(read_frame("film.webp", 30, &info, &time));
+  assert_int_equal(info.frame_count, 31); /* the first, and 15 for each turn of 1 s */
+  assert_int_equal(time, 29 * 66 + 2 * 1000);
   EXPECT(1, "two postures", "render lungs.safetensors --posture supine -o one.webp");
   EXPECT(1, "one volume", "render lungs.safetensors --posture supine,prone:full -o two.webp");
 }

@@ -14,14 +14,16 @@
  *                   + 4/9 (6.2 mm)^2 k_ij I                      another day, if asked for
  *
  *     sigma   expected error of the terms displacement and turn (supine/locate.h), mm
- *     k_ij    r (1 + a) exp(-a), a = sqrt(3) |p_i - p_j| / 90 mm, p: positions in the scan; r is 1
- * in one lung and 1/3 between two C_st    correlation of two states, common to all points: (V_s +
- * V_t - V_st) / (2 sqrt(V_s V_t)), V the mean sigma^2 of all vertices, V_st that from state s to
- * state t. Negative eigenvalues are set to 0, and the diagonal then to 1 d       shift of the point
- * by one standard deviation of an assumed volume, mm, which moves all points together
+ *     k_ij    r (1 + a) exp(-a), a = sqrt(3) |p_i - p_j| / 90 mm, p: positions in the scan
+ *     r       1 in one lung, 1/3 between two
+ *     C_st    correlation of two states, common to all points: (V_s + V_t - V_st) /
+ *             (2 sqrt(V_s V_t)), V the mean sigma^2 of all vertices, V_st that from state s to t.
+ *             Negative eigenvalues are set to 0, and the diagonal then to 1
+ *     d       shift of the point by one standard deviation of an assumed volume, mm, which moves
+ *             all points together
  *     c       way from the healthy to the collapsed lung, mm (supine/locate.h)
- *     h, l    12 mm
- * b_i Dg_xy and 3 mm Dg_x, vectors across the body and along x (supine/locate.h)
+ *     h, l    12 mm b_i Dg_xy and 3 mm Dg_x, vectors across the body and along x
+ *             (supine/locate.h)
  *
  * After a fit of landmarks, which the basis keeps, displacement has the covariance of simple
  * kriging instead, which is small near them (unit variance before, noise of a tenth of it, k_L and
