@@ -293,6 +293,20 @@ void supine_patient_check_volume(const supine_volume *named, double held,
   }
 }
 
+bool supine_patient_tell_rest(double share, const double gravity[3], supine_findings *findings) {
+  const supine_resting usual = supine_physics_resting_default();
+  const double supine = share * SUPINE_REST_SHARE / supine_physics_resting_total(&usual, gravity);
+  const bool told =
+      is_told(SUPINE_INPUT_REST_LEAST, supine) || is_told(SUPINE_INPUT_REST_MOST, supine);
+  if (told) {
+    supine_findings_warn(findings,
+                         "the volume at rest is %.0f %% of full inflation by the scans and their "
+                         "states, but %.0f %% in healthy people and %.0f %% in COPD, supine",
+                         100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
+  }
+  return told;
+}
+
 /* Warn if lungs have another width, depth or height than the bounding box of the scan that was
  * fitted. Return whether they have. */
 static bool tell_box(const supine_lungs *lungs, const double low[3], const double high[3],

@@ -64,6 +64,12 @@ supine_status supine_patient_drop_mismatched(const char *name, supine_patient_pa
 void supine_patient_check_volume(const supine_volume *named, double held,
                                  supine_findings *findings);
 
+/** Warn if scans and their states give a volume at rest that people hardly have. Return whether
+ * they do.
+ * @param share  volume at rest / volume at full inflation
+ * @param gravity  direction in which it is at rest, LPS */
+bool supine_patient_tell_rest(double share, const double gravity[3], supine_findings *findings);
+
 /** Warn if lungs are not those of the scan of a fit: by width, depth and height if surfaces were
  * fitted, by volume, and by the share of the landmarks outside. Of one lung, only landmarks tell.
  * @param state  which state the lungs show: 0 the fuller, 1 the emptier */

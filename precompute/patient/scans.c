@@ -101,16 +101,8 @@ static void warn_of_rest(supine_patient_scans *scans, const supine_patient_recor
   const supine_resting usual = supine_physics_resting_default();
   for (size_t k = 0; k < 2; ++k) {
     const double share = supine_patient_rest_share(record, k, &usual);
-    const double here = supine_physics_resting_total(&usual, record->state[k].gravity);
-    const double supine = share * SUPINE_REST_SHARE / here;
     if (share != 0.0 &&
-        (supine_input_judge(SUPINE_INPUT_REST_LEAST, supine) != SUPINE_INPUT_TAKEN ||
-         supine_input_judge(SUPINE_INPUT_REST_MOST, supine) != SUPINE_INPUT_TAKEN)) {
-      supine_findings_warn(&scans->findings,
-                           "the volume at rest is %.0f %% of full inflation by the two "
-                           "scans and their states, but %.0f %% in healthy people and %.0f %% in "
-                           "COPD, supine",
-                           100.0 * share, 100.0 * SUPINE_REST_SHARE, 100.0 * SUPINE_COPD_SHARE);
+        supine_patient_tell_rest(share, record->state[k].gravity, &scans->findings)) {
       const supine_remedy advice[SUPINE_REMEDIES_MAX] = {
           supine_remedy_change("rest", "if it is not the state of that scan")};
       supine_findings_advise(&scans->findings, advice);

@@ -99,12 +99,26 @@ supine_status supine_validation_check_landmarks(const supine_validation *subject
   return SUPINE_OK;
 }
 
+/* Warn if a state that is named from rest does not fit the volume of its scan. */
+static void check_rest(const supine_basis *basis, const supine_state *named, double held,
+                       supine_findings *findings) {
+  supine_state full = *named;
+  supine_pose pose;
+  full.volume = (supine_volume){SUPINE_VOLUME_FULL, 0.0};
+  if (named->volume.kind == SUPINE_VOLUME_REST && named->lung_count == 0 &&
+      supine_basis_pose(basis, &full, &pose, NULL) == SUPINE_OK) {
+    const double share = (held - named->volume.ml) / supine_posed_volume(basis, &pose);
+    (void)supine_patient_tell_rest(share, named->gravity, findings);
+  }
+}
+
 void supine_validation_check_person(const supine_validation *subject, size_t i,
                                     const supine_lungs *scan, supine_findings *findings) {
   const supine_basis_info *info = supine_basis_get_info(subject->basis);
   supine_patient_size size[2] = {{.volume = {0.0}}, supine_patient_size_of(scan)};
-  supine_patient_check_volume(&subject->state[i].state.volume,
-                              size[1].volume[0] + size[1].volume[1], findings);
+  const double held = size[1].volume[0] + size[1].volume[1];
+  supine_patient_check_volume(&subject->state[i].state.volume, held, findings);
+  check_rest(subject->basis, &subject->state[i].state, held, findings);
   if (supine_distance(subject->state[i].state.gravity, subject->from.state.gravity) >=
       same_posture) {
     return;
