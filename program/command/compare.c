@@ -58,7 +58,6 @@ typedef struct request {
   const char *inside;
   bool all;
   supine_frame frame;
-  bool has_breath;
 } request;
 
 static const supine_option table[] = {
@@ -69,7 +68,7 @@ static const supine_option table[] = {
     {.table = supine_options_from, SUPINE_FILLS(request, comparison.from)},
     {.table = supine_options_fiducials_frame, SUPINE_FILLS(request, frame)},
     {"breath", 0, "VOLUME", "tidal volume of the breath whose ventilation by height is computed",
-     SUPINE_FILLS(request, comparison.breath), SUPINE_SAYS_GIVEN(request, has_breath),
+     SUPINE_FILLS(request, comparison.breath), SUPINE_SAYS_GIVEN(request, comparison.breath_given),
      .standard = "500mL", SUPINE_BREATH},
     {"inside", 0, "FILE",
      "structures made by 'supine embed' from the same basis: the report has the displacement of "
@@ -203,7 +202,7 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
                                        &c->basis, error));
   const bool has_volume = state->lung_count > 0 || state->volume.kind != SUPINE_VOLUME_DEFAULT;
   state->gravity[1] = 1.0;
-  if (supine_basis_get_info(c->basis)->is_fields && !wanted->has_breath) {
+  if (supine_basis_get_info(c->basis)->is_fields && !c->breath_given) {
     c->breath = 0.0; /* fields of gravity have no volumes and no breaths */
   }
   if (state->lung_count == 0 && state->volume.kind == SUPINE_VOLUME_DEFAULT) {

@@ -86,7 +86,7 @@ static supine_status find_posture(const supine_comparison *c, float *distance, f
   if (c->breath > 0.0) {
     status = find_breath(c, xyz, posture, error);
     posture->has_breath = status == SUPINE_OK;
-    if (status == SUPINE_ERROR_NUMERICAL) { /* the lungs cannot hold that much more */
+    if (status == SUPINE_ERROR_NUMERICAL && !c->breath_given) { /* more than the lungs hold */
       supine_options_note(command, "without a breath: %s", supine_options_explain(error).text);
       return SUPINE_OK;
     }

@@ -44,7 +44,8 @@ typedef struct supine_comparison {
   const char *title;            /* of the report; NULL for the name of the basis file */
   supine_volume_options volume; /* its state is supine, at the volume of postures that name none */
   supine_from from;
-  double breath; /* volume that a breath adds, mL; 0 if no breath is computed */
+  double breath;     /* volume that a breath adds, mL; 0 if no breath is computed */
+  bool breath_given; /* whether it was asked for: then lungs that cannot hold it are an error */
   supine_basis *basis;
   supine_basis *inside;       /* structures inside the lungs; NULL if there are none */
   supine_options_names names; /* their names */
