@@ -269,16 +269,17 @@ def numbers(text):
     return [float(x) for x in text.split(",")]
 
 
-def warp(path, augment=False):
-    """Move an image of a file by the Python package."""
-    image = next(value for kind, value in MISTAKES["image"][2].items() if f"-{kind}." in path)
+def warp(path, kind_of_data="image", augment=False):
+    """Move an image or labels of a file by the Python package."""
+    image = next(value for kind, value in MISTAKES[kind_of_data][2].items() if f"-{kind}." in path)
     if image is None:  # cut short
         raise ValueError("no array")
     where = {"step": image["step"], "origin": image["origin"]}
     if augment:
         next(supine.augment(lungs, image["values"], states=["prone:rest"], grid=10, **where))
     else:
-        grid.warp(image["values"], "prone:rest", density=True, **where)
+        grid.warp(image["values"], "prone:rest",
+                  labels=kind_of_data == "labels", density=kind_of_data == "image", **where)
 
 
 def dicom(*words):
@@ -341,6 +342,9 @@ DOORS = [
     ("solve MESH", "command", "lungs", lambda x: command("solve", x, "--posture", "prone", "-o", "out.ply")),
     ("fit REST", "command", "scan",
      lambda x: command("fit", x, "full.ply", "--rest", STATE, "--other", "supine:full", "-o", "out.json")),
+    ("fit --state", "command", "scan",
+     lambda x: command("fit", "rest.ply", "full.ply", "--rest", STATE, "--other", "supine:full", "--state", f"{STATE}:{x}",
+                       "-o", "out.json")),
     ("validate --state", "command", "scan", lambda x: command("validate", "lungs.st", "--state", f"{STATE}:{x}")),
     ("embed POINTS", "command", "points", lambda x: command("embed", "lungs.st", x, "-o", "out.st")),
     ("embed(file)", "Python", "points", lambda x: python(lambda: supine.embed(lungs, x))),
@@ -369,6 +373,7 @@ DOORS = [
     ("deform --labels", "command", "labels",
      lambda x: command("deform", "grid.st", "--posture", "prone:rest", "--labels", x, "-o", "out.nrrd")),
     ("warp()", "Python", "image", lambda x: python(lambda: warp(x))),
+    ("warp(labels)", "Python", "labels", lambda x: python(lambda: warp(x, "labels"))),
     ("augment()", "Python", "image", lambda x: python(lambda: warp(x, augment=True))),
     ("precompute --fields", "command", "fields",
      lambda x: command("precompute", "other.ply", "--fields", x, "-o", "out.st")),

@@ -285,6 +285,20 @@ supine_status supine_patient_scans_fit_further_landmarks(
   return supine_patient_gain_fit_landmarks(record, pairs, scans_moved, further, error);
 }
 
+/* Warn if a further state that is named from rest does not fit the volume of its scan. */
+static void check_rest_of_further(const supine_patient_record *record, const supine_state *named,
+                                  double held, supine_findings *findings) {
+  for (size_t k = 0; k < 2; ++k) {
+    const supine_state *shown = &record->state[k];
+    if (named->volume.kind == SUPINE_VOLUME_REST && named->lung_count == 0 &&
+        shown->volume.kind == SUPINE_VOLUME_FULL && record->volume[k] > 0.0) {
+      const double full = (record->volume[k] - shown->volume.ml) /
+                          supine_physics_resting_full_share(shown->gravity);
+      (void)supine_patient_tell_rest((held - named->volume.ml) / full, named->gravity, findings);
+    }
+  }
+}
+
 supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
                                                        const supine_state *state, bool scans_moved,
                                                        const supine_lungs *scan,
@@ -294,6 +308,7 @@ supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *sca
   supine_patient_further *further = append(record, state);
   const size_t other = from->mesh.vertex_count > 0 ? 0 : 1;
   warn_of_two_people(&scans->lungs[other], &record->state[other], scan, state, &scans->findings);
+  check_rest_of_further(record, state, volume_of(scan), &scans->findings);
   if (from->mesh.vertex_count == 0) {
     /* The fuller scan has no surface: move that of the emptier one to the fuller state. */
     *from = scans->lungs[1];
