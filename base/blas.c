@@ -71,8 +71,8 @@ static supine_status refuse(size_t missing, size_t threads, supine_error *error)
 }
 
 supine_status supine_blas_reserve(size_t threads, supine_error *error) {
-  /* Number of buffers that OpenBLAS has mapped here. They belong to the process, as OpenBLAS does.
-   */
+  /* Number of buffers that OpenBLAS has mapped here. They belong to the process, as OpenBLAS
+   * does. */
   static size_t reserved;
   static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
   supine_status status = SUPINE_OK;

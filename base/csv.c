@@ -24,8 +24,8 @@ static char *trim(char *text) {
   return text;
 }
 
-/* Read the next line of the file to csv->text + `used`; set `length` to its length, 0 at the end.
- */
+/* Read the next line of the file to csv->text + `used`; set `length` to its length, 0 at the
+ * end. */
 static supine_status read_line(supine_csv *csv, size_t used, size_t *length, supine_error *error) {
   errno = 0;
   const ssize_t count = getline(&csv->next, &csv->next_size, csv->file);

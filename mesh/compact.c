@@ -14,8 +14,8 @@ static const double filled = 0.7;
 /* Least sum of the vectors of area of an open surface, as a share of its area. */
 static const double gap_share = 1e-3;
 
-/* Compute the eigenvalues of a symmetric matrix [Smith 1961, Commun ACM 4(4), 168], largest first.
- */
+/* Compute the eigenvalues of a symmetric matrix [Smith 1961, Commun ACM 4(4), 168], largest
+ * first. */
 static void eigenvalues(const double m[3][3], double value[3]) {
   const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3.0;
   double square = 0.0;
@@ -114,8 +114,8 @@ static void add_triangle(const supine_mesh *mesh, const uint32_t *triangle, soli
   }
 }
 
-/* Return whether a component is closed, faces outwards and is compact. Its cavities count as solid.
- */
+/* Return whether a component is closed, faces outwards and is compact. Its cavities count as
+ * solid. */
 static bool is_compact(const solid *s) {
   double covariance[3][3];
   if (!(s->sum > 0.0) || supine_length(s->normal) >= gap_share * s->area) {

@@ -57,8 +57,10 @@ supine_mesh_side *supine_mesh_sides_sort(const supine_mesh *mesh, supine_arena *
       }
     }
   }
-  for (size_t v = 0, begin = 0; v < mesh->vertex_count; begin = next[v++]) {
+  size_t begin = 0;
+  for (size_t v = 0; v < mesh->vertex_count; ++v) {
     sort_sides(sides + begin, next[v] - begin);
+    begin = next[v];
   }
   return sides;
 }

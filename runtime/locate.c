@@ -602,8 +602,8 @@ static supine_status locate(workspace *s, supine_locate_residual *residuals, sup
   return status;
 }
 
-/* Warn of the axis on which the points are farthest from the predicted size, if they are too far.
- */
+/* Warn of the axis on which the points are farthest from the predicted size, if they are too
+ * far. */
 static void check_stretch(const supine_location_info *found, supine_findings *findings) {
   static const char *const sizes[] = {"width", "depth", "height"};
   size_t worst = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Fit the simulated volumes by functions of gravity: their limits, and each lung's part of a total.
- */
+/* Fit the simulated volumes by functions of gravity: their limits, and each lung's part of a
+ * total. */
 #include <cblas.h>
 #include <math.h>
 

@@ -146,8 +146,8 @@ bool supine_fields_regression_is_determined(const supine_regression *regression,
   return true;
 }
 
-/* Subtract the product of values [runs, terms] and other [terms, runs] from a matrix [runs, runs].
- */
+/* Subtract the product of values [runs, terms] and other [terms, runs] from a matrix [runs,
+ * runs]. */
 static void subtract_product(size_t runs, size_t terms, const double *values, const double *other,
                              double *matrix) {
   cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)runs, (int)runs, (int)terms, -1.0,

@@ -510,8 +510,8 @@ static void share_range(void *context, size_t begin, size_t end, size_t thread) 
   }
 }
 
-/* Find what the landmarks of a fit, if the lungs' basis has any, leave of the error of each point.
- */
+/* Find what the landmarks of a fit, if the lungs' basis has any, leave of the error of each
+ * point. */
 static supine_status share_errors(embedding *e, supine_error *error) {
   enum { GRAIN = 64 };
   const supine_basis *lungs = e->shells->basis;

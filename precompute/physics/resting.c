@@ -50,8 +50,8 @@ static bool is_share(double share) {
   return share > least_share && share <= most_share;
 }
 
-/* Return the volume at rest in a posture, in the unit of `full` [count], volumes at full inflation.
- */
+/* Return the volume at rest in a posture, in the unit of `full` [count], volumes at full
+ * inflation. */
 static double at_rest(const supine_resting *resting, size_t axis, size_t count, const int *side,
                       const double *full) {
   double rest = 0.0;

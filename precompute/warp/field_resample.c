@@ -222,8 +222,8 @@ static void interpolate_side(const resampling *work, const cells *in, size_t i, 
   *value = sum[1] / sum[0];
 }
 
-/* Interpolate and scale densities, HU. Return whether a point is in the lungs or at their border.
- */
+/* Interpolate and scale densities, HU. Return whether a point is in the lungs or at their
+ * border. */
 INLINE bool take_densities(const resampling *work, const cells *nodes, const cells *in,
                            double (*corner)[RUN], size_t count, double *values, tally *sum) {
   unsigned char kind[RUN];

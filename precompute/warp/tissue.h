@@ -101,8 +101,8 @@ supine_status supine_warp_tissue_hold(const supine_tissue *tissue, supine_field 
 supine_status supine_warp_tissue_fill(supine_tissue *tissue, supine_error *error);
 /* Internal: find the compact parts among the voxels of `kind` that are soft (parts.c). */
 supine_status supine_warp_tissue_find_parts(supine_tissue *tissue, supine_error *error);
-/* Internal: put parts that are close to each other into groups, and find the gaps between groups.
- */
+/* Internal: put parts that are close to each other into groups, and find the gaps between
+ * groups. */
 supine_status supine_warp_tissue_group(supine_tissue *tissue, supine_error *error);
 /* Internal: find the mean density of aerated tissue, masses and amounts of soft tissue (air.c). */
 supine_status supine_warp_tissue_find_air(const supine_image *ct, supine_tissue *tissue,

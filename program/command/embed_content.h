@@ -22,8 +22,8 @@ typedef struct supine_embed_content {
   supine_mesh_load_options load;
 } supine_embed_content;
 
-/* Read points, meshes and label maps, or make a grid, like that of an image if `paths` names one.
- */
+/* Read points, meshes and label maps, or make a grid, like that of an image if `paths` names
+ * one. */
 supine_status supine_command_embed_read(const supine_inside_shells *shells,
                                         const supine_embed_content *wanted, char **paths,
                                         size_t count, supine_inside_content *content,

@@ -217,8 +217,8 @@ static const char *const first[] = {"file",           "lungs",    "made_by",
                                     "expected_error", "facts",    "full_expected",
                                     "resting_shares", "warnings", "embedded"};
 
-/* Put what matters into the order of the text, and add the rest if it is wanted. Free `described`.
- */
+/* Put what matters into the order of the text, and add the rest if it is wanted. Free
+ * `described`. */
 static json_t *order_text(json_t *described, bool all) {
   json_t *text = json_object();
   for (size_t i = 0; i < sizeof first / sizeof *first; ++i) {

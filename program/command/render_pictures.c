@@ -139,8 +139,8 @@ static supine_status fill_panel(studio *s, size_t i, bool tell, supine_error *er
   return SUPINE_OK;
 }
 
-/* Compute the expected errors of panel i: of the structures inside the lungs, else of the surface.
- */
+/* Compute the expected errors of panel i: of the structures inside the lungs, else of the
+ * surface. */
 static supine_status expect(const studio *s, size_t i, supine_errors *errors, supine_error *error) {
   return supine_posed_errors(s->inside != NULL ? s->inside : s->basis, &s->postures.item[i].state,
                              &s->from.state, errors, error);

@@ -74,8 +74,8 @@ supine_state supine_options_breath_state(const supine_basis *basis, const double
     state.volume.kind = SUPINE_VOLUME_SCAN;
   }
   if (!info->has_rest && info->hilum != NULL) {
-    /* The state `scan` has the lungs before their collapse; the reference surface has its volume.
-     */
+    /* The state `scan` has the lungs before their collapse; the reference surface has its
+     * volume. */
     state.volume.kind = SUPINE_VOLUME_ABSOLUTE;
     for (size_t lung = 0; lung < info->lung_count; ++lung) {
       state.volume.ml += info->reference_volume[lung];

@@ -150,8 +150,8 @@ void supine_options_signals_catch(bool orderly_end) {
   command_polls = orderly_end ? 1 : 0;
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
     struct sigaction before;
-    /* A signal that nohup(1), or a shell in the background, made the program ignore stays ignored.
-     */
+    /* A signal that nohup(1), or a shell in the background, made the program ignore stays
+     * ignored. */
     if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) {
       (void)sigaction(numbers[i], &action, NULL);
     }

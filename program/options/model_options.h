@@ -9,8 +9,8 @@
 
 #include "program/options/command.h"
 
-/* Options of lungs and their model. supine_options_prepare completes `precompute` from the others.
- */
+/* Options of lungs and their model. supine_options_prepare completes `precompute` from the
+ * others. */
 typedef struct supine_model_options {
   supine_precompute_options precompute;
   supine_mesh_load_options frame; /* axes and unit */

@@ -126,8 +126,8 @@ supine_status supine_options_tell_folds(const supine_basis *basis, const char *c
                                         const supine_state *state, const supine_pose *pose,
                                         supine_error *error);
 
-/* Compute the pose of a state, which supine_basis_pose judges, and call supine_options_tell_folds.
- */
+/* Compute the pose of a state, which supine_basis_pose judges, and call
+ * supine_options_tell_folds. */
 supine_status supine_options_pose(const supine_basis *basis, const char *command,
                                   const supine_state *state, supine_pose *pose,
                                   supine_error *error);

@@ -60,8 +60,8 @@ static const supine_target *find_first(const supine_comparison *c,
   return first->anatomy ? NULL : first;
 }
 
-/* Return a sentence on a posture: how far its first target or, without targets, the surface moves.
- */
+/* Return a sentence on a posture: how far its first target or, without targets, the surface
+ * moves. */
 static json_t *finding(const supine_comparison *c, size_t posture) {
   const supine_compared_posture *p = &c->posture[posture];
   const supine_target *t = find_first(c, p);
@@ -70,7 +70,8 @@ static json_t *finding(const supine_comparison *c, size_t posture) {
   const char *name = p->item->name;
   char way[96];
   char text[512] = "";
-  if (p->label != name) {
+  const bool on_side = p->label != name; /* the label of others is the name itself */
+  if (on_side) {
     supine_text_add(text, sizeof text, "Lying on the %s,", p->label);
   } else if (supine_ascii_is_letter(name[0])) {
     supine_text_add(text, sizeof text, "%c%s,", supine_ascii_upper(name[0]), name + 1);

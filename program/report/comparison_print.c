@@ -91,8 +91,8 @@ static void add_row(json_t *tables, const char *heading, const char *name, const
   (void)json_array_append_new(json_object_get(tables, heading), row);
 }
 
-/* Add the targets in a posture: all, or the `most` to tell of first. Return how many are left out.
- */
+/* Add the targets in a posture: all, or the `most` to tell of first. Return how many are left
+ * out. */
 static size_t add_targets(const supine_comparison *c, const supine_compared_posture *p, size_t most,
                           json_t *text) {
   size_t left_out = 0;

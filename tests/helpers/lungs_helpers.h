@@ -53,8 +53,8 @@ static inline bool helper_real_path(const char *name, char path[512]) {
   return false;
 }
 
-/* Load one or two surfaces of real lungs into one supine_lungs. Return false if a file is missing.
- */
+/* Load one or two surfaces of real lungs into one supine_lungs. Return false if a file is
+ * missing. */
 static inline bool helper_real_lungs(const char *const *names, size_t count, supine_axes axes,
                                      supine_lungs *lungs) {
   supine_mesh meshes[2] = {0};

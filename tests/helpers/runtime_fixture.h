@@ -25,8 +25,8 @@ typedef struct fixture {
   /* Volume of each lung, mL, as a polynomial of the weights (supine_volume_contract): [lungs, 3,
      modes], [lungs, 3, modes, modes] and [lungs, modes, modes, modes] */
   double *linear, *quadratic, *cubic;
-  /* [lungs, 9] harmonic coefficients, mL, of the volume at rest as a function of gravity, or NULL
-   */
+  /* [lungs, 9] harmonic coefficients, mL, of the volume at rest as a function of gravity, or
+   * NULL */
   const double *resting;
   const char *bend;         /* metadata "bend", or NULL */
   const char *scan_gravity; /* metadata "scan_gravity", or NULL */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Test the library supine::precompute: options and results as structs, and several bases at once.
- */
+/* Test the library supine::precompute: options and results as structs, and several bases at
+ * once. */
 #include <pthread.h>
 
 #include "precompute/lungs/phantom.h"

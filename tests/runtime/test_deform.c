@@ -498,8 +498,8 @@ TEST(test_deform_batch_each_orientation_within_stated_error) {
   check_batch(90, 256, true, 3, 1, 90);
 }
 
-/* A shader that reads coefficients from a texture takes weights of more modes than attributes hold.
- */
+/* A shader that reads coefficients from a texture takes weights of more modes than attributes
+ * hold. */
 TEST(test_gl_weights_many_modes_all_written) {
   enum { VERTICES = 20, MODES = 41, SLOTS = 44 };
   opened o = made(fixture_create(VERTICES, MODES, 1, 2, true, false, 3, 17));

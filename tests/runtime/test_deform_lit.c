@@ -164,8 +164,8 @@ TEST(test_deform_lit_range_same_bits_as_whole) {
   }
 }
 
-/* Compare what supine_deform_lit writes with supine_deform and supine_normals, whole and in parts.
- */
+/* Compare what supine_deform_lit writes with supine_deform and supine_normals, whole and in
+ * parts. */
 static void expect_triangle_normals(const supine_basis *basis, const supine_pose *pose) {
   float xyz[3 * VERTICES];
   float normals[3 * VERTICES];

@@ -452,8 +452,8 @@ TEST(test_locate_lines_of_two_views_equal_points_and_one_view_leaves_the_depth) 
   free(space);
 }
 
-/* A random wrong half of the points must raise the stated errors; what no patient has is refused.
- */
+/* A random wrong half of the points must raise the stated errors; what no patient has is
+ * refused. */
 TEST(test_locate_residuals_beyond_stated_errors_raise_them_or_are_refused) {
   world *w = *state;
   const supine_state truth = state_of("supine:full-700");

@@ -4,6 +4,8 @@
     stream_slicer.py EXAMPLES PORT BASIS"""
 import os
 import sys
+import types
+from unittest import mock
 
 sys.path[:0] = [os.path.join(sys.argv[1], folder) for folder in ("slicer", "tracker")]
 from answers import faces, number_messages, wait_for  # noqa: E402
@@ -74,10 +76,6 @@ else:
 
 # The scripted module, with stand-ins for Slicer's modules: it starts, follows a transform, stops, and reports a dead
 # server.
-import os  # noqa: E402
-import types  # noqa: E402
-from unittest import mock  # noqa: E402
-
 
 class Base:
     def __init__(self, parent=None):

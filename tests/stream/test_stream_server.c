@@ -408,8 +408,8 @@ TEST(test_server_volume_refused_keeps_state_and_tells_peer) {
   stage_destroy(s);
 }
 
-/* In fields over gravity and volume, weights and points are those of each lung at its own volume.
- */
+/* In fields over gravity and volume, weights and points are those of each lung at its own
+ * volume. */
 TEST(test_server_simulated_two_volumes_equal_basis_pose) {
   enum { COUNT = 60, NUMBERS = 2 * 2 + 3 * 2 };
   stage *s = fixture_allocate(1, sizeof *s);

@@ -76,8 +76,8 @@ static json_t *target_names(const glb *g) {
   return names;
 }
 
-/* Return what the extras say about the gains of another simulator's fields; NULL for other bases.
- */
+/* Return what the extras say about the gains of another simulator's fields; NULL for other
+ * bases. */
 static const char *gains_text(const glb *g) {
   if (g->info->order > 0) {
     return simulated_text;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Measure how far a simplified surface is from the whole one, and what its page must know of that.
- */
+/* Measure how far a simplified surface is from the whole one, and what its page must know of
+ * that. */
 #include <math.h>
 #include <string.h>
 

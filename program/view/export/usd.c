@@ -15,8 +15,8 @@
 enum { DEFAULT_VERTICES = 5000, NAME_SIZE = 48 };
 static const double degrees = 180.0 / 3.14159265358979323846;
 
-/* Arrays of a lung's mesh: positions and normals, and what a blend shape adds to them at weight 1.
- */
+/* Arrays of a lung's mesh: positions and normals, and what a blend shape adds to them at weight
+ * 1. */
 typedef enum usd_kind { USD_POINTS, USD_NORMALS, USD_OFFSETS, USD_NORMAL_OFFSETS } usd_kind;
 
 typedef struct usd {
@@ -102,8 +102,8 @@ static void put_triangles(const usd *u, size_t lung) {
   (void)fputs("]\n", u->file);
 }
 
-/* Print the names of the blend shapes of a lung, each between `before` and `after`, joined by ",".
- */
+/* Print the names of the blend shapes of a lung, each between `before` and `after`, joined by
+ * ",". */
 static void put_shapes(const usd *u, size_t lung, const char *before, const char *after) {
   for (size_t j = 0; j < u->targets.count; ++j) {
     (void)fprintf(u->file, "%s%s%s_%zu%s", j == 0 ? "" : ",", before, u->name[lung], j, after);

@@ -20,12 +20,14 @@ class Device {
     this.gpuTime = NaN;
   }
 
+  /** Compile and link a program. `vertex` and `fragment` are the ids of its sources; without a fragment shader it only
+   * writes `outputs`, the names of what the vertex shader returns. Return it with the places of its uniforms. */
   program(vertex, fragment, outputs, text = source(vertex)) {
     const { gl } = this;
     const program = gl.createProgram();
-    const attach = (type, text) => {
+    const attach = (type, body) => {
       const shader = gl.createShader(type);
-      gl.shaderSource(shader, `#version 300 es\nprecision highp float;\nprecision highp int;\n${text}`);
+      gl.shaderSource(shader, `#version 300 es\nprecision highp float;\nprecision highp int;\n${body}`);
       gl.compileShader(shader);
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS))
         throw new Error(`${vertex}: ${gl.getShaderInfoLog(shader)}`);
