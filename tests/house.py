@@ -515,10 +515,14 @@ def check_forms(files):
             faults.append(f"house.py does not tell '{refused}' from '{plain}'")
     for file in files:
         with open(os.path.join(source, file), encoding="utf-8") as opened:
-            text = code_of(opened.read())
+            written = opened.read()
+        text = code_of(written)
         for position, form in forms_of(text):
             line = text.count("\n", 0, position) + 1
             faults.append(f"{file}:{line}: {form}")
+        for found in re.finditer(r"^ */\* .*\n *\*/$", written, re.M):
+            line = written.count("\n", 0, found.start()) + 1
+            faults.append(f"{file}:{line}: the end of the comment stands alone: put its last word there, too")
 
 
 def check_examples():
