@@ -548,7 +548,7 @@ typedef struct sighting {
 
 /* The field of located lungs has the positions and errors that locate states, samples have its
  * covariance, and mended ones the volume that was given. */
-TEST(test_covariance_of_located_lungs_is_that_of_locate) {
+TEST_FULL(test_covariance_of_located_lungs_is_that_of_locate) {
   enum { SEEN = 9 };
   static const sighting cases[] = {{"volume given", 3, false, false, false},
                                    {"volume fitted, frame turned", 0, true, true, false},
