@@ -630,7 +630,8 @@ static void check_warped_by(const char *probe, const char *command) {
     fail_msg("%s", error.message);
   }
   (void)unlink(in_folder("warped.nrrd"));
-  (void)snprintf(text, sizeof text, "cd %s && %s", folder, command);
+  assert_int_equal(setenv("FOLDER", folder, 1), 0);
+  (void)snprintf(text, sizeof text, "cd \"$FOLDER\" && %s", command);
   assert_int_equal(system(text), 0); /* NOLINT(cert-env33-c) */
   supine_image_free(&image);
   if (supine_image_read(in_folder("warped.nrrd"), &image, &error) != SUPINE_OK) {
