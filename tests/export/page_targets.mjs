@@ -192,7 +192,7 @@ async function checkDoubt(page) {
   assert.ok(Math.max(...away) < WRITTEN_MM, `targets are up to ${Math.max(...away)} mm from those of deform`);
   assert.ok(far > 1, `the surface differs by ${far} mm`);
   await page.locator('#doubt').press('Space');
-  assert.ok(await page.locator('#sampled').isHidden());
+  await page.locator('#sampled').waitFor({ state: 'hidden' });
 }
 
 /* The page, of the whole surface and of a simplified one. */
