@@ -41,7 +41,9 @@ def cost(build, name):
                           check=False)
     reap()
     end = resource.getrusage(resource.RUSAGE_CHILDREN)
-    state = "skipped" if "Skipped" in done.stdout else "failed" if done.returncode else ""
+    state = "failed" if done.returncode else ""
+    if "Skipped" in done.stdout:
+        state = "skipped"
     return end.ru_utime - begin.ru_utime + end.ru_stime - begin.ru_stime, state
 
 

@@ -18,9 +18,8 @@ import subprocess
 import sys
 
 from helpers.verdict import (SOURCE, SUPINE, command, even, javascript, leave, pose_in_c, python, stream, supine,
-                             table, transform, volume_number, volume_text, voxels_of, write_image, write_pairs,
-                             write_ply,
-                             write_points)
+                             table, transform, verdict_of, volume_number, volume_text, voxels_of, write_image,
+                             write_pairs, write_ply, write_points)
 import numpy as np
 
 try:
@@ -295,7 +294,7 @@ def script(name, *words):
                           text=True, check=False, env={**os.environ, "SUPINE": SUPINE})
     said = done.stderr + done.stdout
     assert "Traceback" not in said, said
-    return ("refused" if done.returncode else "told" if "warning:" in said else "taken"), said
+    return verdict_of(done.returncode, said), said
 
 
 def add_dose(path):

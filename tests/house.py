@@ -276,7 +276,7 @@ def locale_fault(name, parts, function):
         if not name.startswith("supine_"):
             return "the result depends on the host's locale: use base/ascii.h"
     elif name.endswith("printf"):
-        position = 2 if name == "snprintf" else 0 if name == "printf" else 1
+        position = {"snprintf": 2, "printf": 0}.get(name, 1)
         if name[0] == "v" or REAL.search(literals) or (len(parts) > position and '"' not in parts[position]):
             return "reals depend on the host's locale: use supine_print or supine_print_text (base/number.h)"
     elif name.endswith("scanf"):

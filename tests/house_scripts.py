@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Check the length of lines and functions of JavaScript and Python, for house.py. Rows of tables in Markdown may be
-long."""
+"""Check the length of lines and functions of JavaScript and Python, for house.py, and that no conditional expression
+has another one as a part. Rows of tables in Markdown may be long."""
 import ast
 import os
 import re
@@ -31,8 +31,23 @@ def python_functions(text):
             yield node.lineno, node.end_lineno - node.lineno - (about.end_lineno - about.lineno + 1 if about else 0)
 
 
+def nested_python(text):
+    """Yield the line of each conditional expression with another one as a part."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.IfExp) and any(isinstance(x, ast.IfExp) for x in (node.body, node.test, node.orelse)):
+            yield node.lineno
+
+
+def nested_javascript(lines):
+    """Yield the number of each line with a conditional expression behind the colon of another one, outside texts."""
+    for number, line in enumerate(lines, 1):
+        found = re.search(r" \? [^?]* : ([^?,]*) \? ", re.sub(r"//.*|'[^']*'|`[^`]*`", "", line))
+        if found and found[1].count(")") <= found[1].count("("):
+            yield number
+
+
 def faults_of(source, files):
-    """Return what is too long in the files of JavaScript and Python."""
+    """Return what is too long, or nested, in the files of JavaScript and Python."""
     found = []
     for file in files:
         script = file.endswith((".js", ".mjs")) and file not in THIRD_PARTY
@@ -47,4 +62,6 @@ def faults_of(source, files):
         for number, length in javascript_functions(lines) if script else python_functions(text):
             if length > FUNCTION_MOST:
                 found.append(f"{file}:{number}: a function of {length} lines: at most {FUNCTION_MOST}")
+        for number in nested_javascript(lines) if script else nested_python(text):
+            found.append(f"{file}:{number}: a conditional expression in another one: use if, or a table")
     return found

@@ -502,7 +502,9 @@ for row in rows:
         said = {interface: call() for interface, call in calls.items()}
         verdicts = {interface: done[0] for interface, done in said.items() if done is not None}
         print(f"{name:20} {kind:6} " + " ".join(f"{verdicts.get(interface, '-'):11}" for interface in INTERFACES))
-        good = {"taken"} if kind == "right" else {expected} if expected else {"told", "refused"}
+        good = {"taken"}
+        if kind == "wrong":
+            good = {expected} if expected else {"told", "refused"}
         if len(set(verdicts.values())) > 1 or not set(verdicts.values()) <= good:
             faults.append(f"{name}, {kind}: {verdicts}, not {sorted(good)}: " + "; ".join(
                 done[1].strip().split("\n")[-1] for done in said.values() if done is not None))

@@ -144,7 +144,9 @@ def follow(words, name, value):
     if option in words:
         at = words.index(option)
         del words[at:at + (1 if name in SWITCHES else 2)]
-    return words + ([] if value is None else [option] if value == "" else [option, value])
+    if value is None:
+        return words
+    return words + ([option] if value == "" else [option, value])
 
 
 def result(words):

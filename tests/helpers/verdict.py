@@ -57,11 +57,18 @@ def table():
     return rows
 
 
+def verdict_of(code, said):
+    """Return the verdict of a program that has ended with an exit code and has said something."""
+    if code != 0:
+        return "refused"
+    return "told" if "warning:" in said else "taken"
+
+
 def command(*words):
     """Run the program; return the verdict and what it said."""
     done = subprocess.run([SUPINE, *map(str, words)], capture_output=True, text=True, check=False)
     assert done.returncode in range(6), done
-    return ("refused" if done.returncode else "told" if "warning:" in done.stderr else "taken"), done.stderr
+    return verdict_of(done.returncode, done.stderr), done.stderr
 
 
 def python(call):

@@ -111,7 +111,9 @@ def named(word):
         line = text[:text.index(m["-"])].count("\n") + 1
         by = tries(m["@"], text.replace(m["-"], m["+"]), [[m["~"]]])
         survived += not by
-        verdict = "no build " if by is None else "killed   " if by else "SURVIVED "
+        verdict = "killed   " if by else "SURVIVED "
+        if by is None:
+            verdict = "no build "
         print(f"{verdict} {m['#']}, {m['@']}:{line}: {by}", flush=True)
     print(f"{len(mutants) - survived} of {len(mutants)} named mutants killed")
     return survived == 0

@@ -4,7 +4,7 @@
 
 function fromBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-  const padding = text.endsWith('==') ? 2 : text.endsWith('=') ? 1 : 0;
+  const padding = [2, 1].find((n) => text.endsWith('='.repeat(n))) ?? 0;
   const bytes = new Uint8Array((text.length / 4) * 3 - padding);
   const piece = 1 << 16;
   for (let from = 0, to = 0; from < text.length; from += piece) {

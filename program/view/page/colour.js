@@ -10,7 +10,7 @@ function tickStep(value) {
   if (!(value > 0)) return 0.2;
   const power = 10 ** Math.floor(Math.log10(value / 4));
   const steps = value / 4 / power;
-  return power * (steps >= 5 ? 5 : steps >= 2 ? 2 : 1);
+  return power * ([5, 2].find((round) => steps >= round) ?? 1);
 }
 
 /** Return the upper end of a range of colours: `value` rounded up to a tick. */

@@ -252,7 +252,9 @@ function answerOf(moved, target) {
   const told = target ?? { mm: moved.mean, error: moved.error };
   if (moved.largest < 0.05) return 'reference';
   if (!isTold(told)) return `${told.mm.toFixed(1)} mm, error ${told.error.toFixed(1)}`;
-  return `${told.mm.toFixed(1)} mm${!target ? ' on average' : told.mm < 1 ? '' : `, ${wayWords(target.move, 1)}`}`;
+  const length = `${told.mm.toFixed(1)} mm`;
+  if (!target) return `${length} on average`;
+  return told.mm < 1 ? length : `${length}, ${wayWords(target.move, 1)}`;
 }
 
 /** Bars with the lungs' volumes: a tick for the earlier volume, a dot for that now, and a band for its range. */

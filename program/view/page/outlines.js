@@ -55,8 +55,10 @@ function planesFor(gravity) {
   return [2, lengthwise].map((axis) => {
     const flat = gravity.map((g, i) => (i === axis ? 0 : -g));
     const standing = Math.hypot(...flat) < 0.3 || (axis !== 2 && Math.abs(flat[2]) > 0.8);
-    const up = standing ? (axis === 2 ? ENDS.A : flat[2] < 0 && axis !== 2 ? ENDS.F : ENDS.H) : unit(flat);
-    let towards = axis === 2 ? ENDS.F : axis === 1 ? ENDS.A : ENDS.R; // the side that the plane is seen from
+    const head = flat[2] < 0 ? ENDS.F : ENDS.H;
+    const upright = axis === 2 ? ENDS.A : head;
+    const up = standing ? upright : unit(flat);
+    let towards = [ENDS.R, ENDS.A, ENDS.F][axis]; // the side that the plane is seen from
     if (axis !== 2 && !standing && cross(up, towards)[2] > 0) towards = towards.map((x) => -x);
     const [side] = Object.entries(ENDS).find(([, end]) => dot(end, towards) > 0.9);
     return { axis, up, right: cross(up, towards), from: VIEWS[side].toLowerCase() };
