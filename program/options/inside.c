@@ -152,8 +152,8 @@ static supine_target average(const supine_options_names *names, size_t begin, si
 }
 
 /* Compute the volume of each structure whose positions are `xyz` [N, 3]. The normals of a closed
- * surface sum to 0, and its volume is a sixth of the sum of (corner) . (normal) over its triangles.
- */
+ * surface sum to 0, and its volume is a sixth of the sum of (corner) . (normal) over its
+ * triangles. */
 static void find_volumes(const supine_basis_info *info, const supine_options_names *names,
                          const float *xyz, int side, supine_target *targets) {
   for (size_t part = 0; part < names->count; ++part) {
