@@ -67,7 +67,11 @@ static size_t number_components(const supine_mesh *mesh, uint32_t *component) {
     const uint32_t next = mesh->triangles[i % 3 < 2 ? i + 1 : i - 2];
     const uint32_t a = root_of(component, mesh->triangles[i]);
     const uint32_t b = root_of(component, next);
-    component[a > b ? a : b] = a < b ? a : b;
+    if (a < b) {
+      component[b] = a;
+    } else {
+      component[a] = b;
+    }
   }
   for (size_t i = 0; i < mesh->vertex_count; ++i) { /* parents have lower indices */
     component[i] = component[i] == i ? (uint32_t)count++ : component[component[i]];
@@ -82,7 +86,7 @@ typedef struct solid {
   double mean[3];         /* integral of the position, mm^4 */
   double square[9];       /* integral of the products of two coordinates, mm^5 */
   double normal[3], area; /* sum of its vectors of area, 0 if it is closed, and area; twice, mm^2 */
-  double low[3], high[3]; /* its box, mm */
+  double low[3], high[3]; /* corners of its box, relative to the same vertex, mm */
   uint32_t part;          /* 1 + index of the compact part that it belongs to; 0 if none */
 } solid;
 

@@ -29,7 +29,7 @@ enum { LOCATE_BLOCK = 128 }; /**< number of vertices evaluated at once */
  * metadata "expected_error_mm" of the file or, if the file lacks it, SUPINE_EXPECTED_ERROR_MM. */
 double supine_expected_constant(const supine_basis *basis);
 
-/** Return the number of landmarks of a patient's fit that the file keeps. */
+/** Return how many landmarks of a patient's fit the file has; 0 if it was not made from one. */
 size_t supine_expected_landmark_count(const supine_basis *basis);
 
 /** Return the mean share of the error's variance that the landmarks leave at points that were held

@@ -157,7 +157,8 @@ static void grouping_add(grouping *made, const size_t *key, size_t value) {
 static const size_t smallest = SIZE_MAX - 1;
 static const size_t largest = SIZE_MAX;
 
-/* Return the place of a volume among `count` of its direction: smallest, largest, or its rank. */
+/* Return where a volume stands among the `count` that one direction was simulated at: `smallest`,
+ * `largest`, or otherwise `rank`, the number of smaller ones. */
 static size_t place_of(size_t rank, size_t count) {
   if (rank == 0) {
     return smallest;

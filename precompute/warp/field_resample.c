@@ -21,7 +21,7 @@ typedef struct tally {
   int64_t aerated[SUPINE_LUNGS_MAX]; /* its part that is proportional to the scale */
 } tally;
 
-/* Rows for each row of a sample. */
+/* To find the scales of densities, every eighth row is enough. */
 enum { SAMPLE = 8 };
 
 /* Numbers of a tally for 1 HU. A CT has up to 2^30 voxels of up to 2^12 HU. */

@@ -25,7 +25,7 @@ typedef struct supine_warp_part {
 /** What the value of a voxel in `kind` means; 0 if the voxel belongs to no lung and touches none.
  */
 enum {
-  SUPINE_TISSUE_LUNG_INDEX = 15, /* mask of the index of the lung */
+  SUPINE_TISSUE_LUNG_INDEX = 15, /* these bits are the index of the lung */
   SUPINE_TISSUE_LUNG = 16,       /* the voxel belongs to this lung */
   SUPINE_TISSUE_BORDER = 32 /* the eight voxels of the cell that begins here are of two kinds */
 };

@@ -98,10 +98,13 @@ static supine_status write_model(const supine_basis *basis, const request *wante
   }
   const size_t bytes = written.bytes;
   const size_t lungs = supine_basis_get_info(basis)->lung_count;
-  const bool small = bytes < 100000;
-  supine_options_line("%s: %zu lung%s with %s, %.*f %s%s\n", wanted->path, lungs,
-                      lungs == 1 ? "" : "s", holds, small ? 0 : 2,
-                      (small ? 1e-3 : 1e-6) * (double)bytes, small ? "kB" : "MB", after);
+  const char *plural = lungs == 1 ? "" : "s";
+  supine_options_line("%s: %zu lung%s with %s, ", wanted->path, lungs, plural, holds);
+  if (bytes < 100000) {
+    supine_options_line("%.0f kB%s\n", 1e-3 * (double)bytes, after);
+  } else {
+    supine_options_line("%.2f MB%s\n", 1e-6 * (double)bytes, after);
+  }
   SUPINE_ADD_RESULT(json_pack("{s:o, s:I, s:I}", "file", supine_options_json_text(wanted->path),
                               "lungs", (json_int_t)lungs, "bytes", (json_int_t)bytes));
   if (written.vertices < supine_basis_get_info(basis)->vertex_count) {

@@ -16,6 +16,7 @@ sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 if importlib.util.find_spec("vtk") is None:
     print("skipped: this python has no VTK")
     sys.exit(77)
+from helpers.slicer_stand_in import Base, Model  # noqa: E402
 from helpers.verdict import SOURCE, command, leave  # noqa: E402
 import numpy as np  # noqa: E402
 import vtk  # noqa: E402
@@ -27,29 +28,6 @@ STATE, SINCE = "0:-1:0:rest", "supine:rest"
 TARGETS = [("RLL tumour", (104, 112, -176)), ("LUL nodule", (-86, 206, -84))]  # examples/lungs/targets.csv in RAS
 FIXED = [("a", (-80, 200, -60)), ("b", (-90, 120, -200)), ("c", (90, 130, -220)), ("d", (70, 120, -120))]
 STORED = 2e-3  # mm: the package stores coefficients in 16 bits, the program in 32, and CSV files have three digits
-
-
-class Base:
-    """Stands in for the three classes of Slicer that a module inherits."""
-
-    def __init__(self, parent=None):
-        self.layout = mock.MagicMock()
-
-    def setup(self):
-        pass
-
-
-class Model:
-    """Stands in for vtkMRMLModelNode."""
-    mesh = None
-
-    def GetPolyData(self):
-        return self.mesh
-
-    def SetAndObservePolyData(self, mesh):
-        self.mesh = mesh
-
-    SetName = CreateDefaultDisplayNodes = mock.MagicMock()
 
 
 class Fiducials:

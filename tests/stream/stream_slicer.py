@@ -8,6 +8,8 @@ import types
 from unittest import mock
 
 sys.path[:0] = [os.path.join(sys.argv[1], folder) for folder in ("slicer", "tracker")]
+sys.path.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from helpers.slicer_stand_in import Base, Model  # noqa: E402
 from answers import faces, number_messages, wait_for  # noqa: E402
 from slicer_lung import SERVER_OPTIONS, Surface  # noqa: E402
 from supine_link import Basis, Link, array  # noqa: E402
@@ -58,15 +60,6 @@ except ImportError:
 else:
     from slicer_lung import show_points
 
-    class Model:
-        mesh = None
-
-        def GetPolyData(self):
-            return self.mesh
-
-        def SetAndObservePolyData(self, mesh):
-            self.mesh = mesh
-
     model = Model()
     for _ in range(2):
         show_points(vtk, model, points, surface.triangles)
@@ -74,17 +67,9 @@ else:
     assert model.mesh.GetNumberOfPolys() == len(surface.triangles) // 3
     assert max(abs(a - b) for a, b in zip(model.mesh.GetPoint(7), points[21:24])) < 1e-6
 
+
 # The scripted module, with stand-ins for Slicer's modules: it starts, follows a transform, stops, and reports a dead
 # server.
-
-class Base:
-    def __init__(self, parent=None):
-        self.layout = mock.MagicMock()
-
-    def setup(self):
-        pass
-
-
 class VtkMatrix:
     def GetElement(self, row, column):
         return float(row == column)
