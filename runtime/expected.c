@@ -501,21 +501,18 @@ static bool is_same(const supine_basis *basis, const supine_pose *a, const supin
   return apart == 0;
 }
 
-/* Return the error of a fit to another simulator's fields in a direction of gravity, divided by its
- * RMS over all directions: |E y|, or 1 if the file does not say. */
-static double error_along(const supine_basis *basis, const double gravity[3]) {
+double supine_expected_along(size_t band, const double *harmonics, const double gravity[3]) {
   double y[(FIT_BAND_MAX + 2) * (FIT_BAND_MAX + 2)];
-  const size_t band = basis->info.band;
   const size_t count = supine_sh_count(band + 1);
   double square = 0;
-  if (basis->error_gravity == NULL) {
+  if (harmonics == NULL) {
     return 1;
   }
-  (void)supine_sh_evaluate(band + 1, gravity, y); /* supine_basis_pose has accepted the vector */
+  (void)supine_sh_evaluate(band + 1, gravity, y); /* fails for no vector that has a direction */
   for (size_t row = 0; row < 2 * band + 4; ++row) {
     double part = 0;
     for (size_t t = 0; t < count; ++t) {
-      part += basis->error_gravity[row * count + t] * y[t];
+      part += harmonics[row * count + t] * y[t];
     }
     square += part * part;
   }
@@ -531,11 +528,13 @@ static supine_status evaluate_fields(const supine_basis *basis, const supine_sta
   if (basis->vertex_error == NULL) {
     return refuse_fields(basis, error);
   }
-  double factor = error_along(basis, state->gravity);
+  const size_t band = basis->info.band;
+  double factor = supine_expected_along(band, basis->error_gravity, state->gravity);
   if (from != NULL && !supine_basis_is_scan(basis, from)) {
     supine_pose other;
     SUPINE_TRY(supine_basis_pose(basis, from, &other, error));
-    factor = is_same(basis, pose, &other) ? 0 : hypot(factor, error_along(basis, from->gravity));
+    const double before = supine_expected_along(band, basis->error_gravity, from->gravity);
+    factor = is_same(basis, pose, &other) ? 0 : hypot(factor, before);
   }
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {
     sigma[i] = (float)(factor * (double)basis->vertex_error[i]);

@@ -43,6 +43,12 @@ supine_status supine_expected_fit_landmarks(const supine_basis *basis, supine_kr
                                             double *space, supine_kriging *fit,
                                             supine_error *error);
 
+/** Return the error of a fit to another simulator's fields in a direction of gravity, divided by
+ * its RMS over all directions: |E y|.
+ * @param band       L, that of the fit, at most FIT_BAND_MAX
+ * @param harmonics  E [2 L + 4, (L + 2)^2], or NULL if it is unknown: the factor is 1 */
+double supine_expected_along(size_t band, const double *harmonics, const double gravity[3]);
+
 /** Limits of the 95 % interval of SUPINE_EXPECTED_ERROR_MM, mm. */
 #define EXPECTED_ERROR_LOW 3.7
 #define EXPECTED_ERROR_HIGH 5.7

@@ -21,6 +21,7 @@
 #include "base/vec3.h"
 #include "precompute/fields/fields.h"
 #include "precompute/projection/tally.h"
+#include "runtime/expected.h"
 
 /* Errors of a few directions vary about what (1) expects of them: stated errors are this much
  * larger. Chosen on nine sets of tests/evidence/fields.py: of 90 found errors two are above the
@@ -259,19 +260,6 @@ supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_
   return SUPINE_OK;
 }
 
-/* Return the length of E y in a direction of gravity. */
-static double error_along(const supine_fit_errors *errors, const double gravity[3]) {
-  double y[(SUPINE_FIT_BAND_MAX + 2) * (SUPINE_FIT_BAND_MAX + 2)];
-  double square = 0.0;
-  (void)supine_sh_evaluate(errors->rows / 2 - 1, gravity, y); /* a unit vector */
-  for (size_t row = 0; row < errors->rows; ++row) {
-    const double *of = errors->harmonics + row * errors->terms;
-    const double part = cblas_ddot((int)errors->terms, of, 1, y, 1);
-    square += part * part;
-  }
-  return sqrt(square);
-}
-
 void supine_fields_complete_errors(size_t vertex_count, supine_fit_errors *errors) {
   enum { DIRECTIONS = 2000 };
   double square = 0.0;
@@ -286,7 +274,7 @@ void supine_fields_complete_errors(size_t vertex_count, supine_fit_errors *error
   for (size_t d = 0; d < DIRECTIONS; ++d) {
     double g[3];
     supine_spiral((double)d, DIRECTIONS, 0.5, g);
-    largest = fmax(largest, error_along(errors, g));
+    largest = fmax(largest, supine_expected_along(errors->rows / 2 - 2, errors->harmonics, g));
   }
   errors->between_mm = sqrt(square);
   errors->gap_mm = largest * errors->between_mm;
