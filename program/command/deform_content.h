@@ -6,6 +6,7 @@
 #include <supine/runtime.h>
 
 #include "mesh/image/image.h"
+#include "precompute/warp/field.h"
 #include "precompute/warp/tissue.h"
 
 #include "program/options/basis_input.h"
@@ -69,5 +70,27 @@ supine_status supine_command_deform_content_read(supine_deform_content *wanted, 
 supine_status supine_command_deform_content(const supine_deform_content *wanted,
                                             const supine_basis *basis, supine_deformation *moved,
                                             supine_error *error);
+
+/* Write where each structure is, or each vertex if `each` is true, as CSV or markups. */
+supine_status supine_command_deform_points(const char *path, const supine_basis *basis,
+                                           const supine_deformation *moved, bool each,
+                                           supine_error *error);
+
+/* Write a surface, and print its largest displacement and its volume. */
+supine_status supine_command_deform_surface(const char *path, const supine_basis *basis,
+                                            supine_deformation *moved, supine_error *error);
+
+/* Write the field, the ventilation, the image and the label map that are wanted. */
+supine_status supine_command_deform_images(const supine_deform_content *wanted,
+                                           const supine_basis *basis,
+                                           const supine_deformation *moved, supine_error *error);
+
+/* Write the ventilation between the states of a field to wanted->ventilation, on the voxels of the
+ * image or else of the labels. Print the sums over the lungs beside what their surfaces take in,
+ * and those over the labels. */
+supine_status supine_command_deform_ventilation(const supine_deform_content *wanted,
+                                                const supine_basis *basis,
+                                                const supine_deformation *moved,
+                                                const supine_field *field, supine_error *error);
 
 #endif

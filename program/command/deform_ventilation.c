@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write the image of --ventilation, and print how much air each lung and each label takes in. */
-#include "program/command/deform_ventilation.h"
-
 #include <math.h>
 
 #include "base/number.h"
 #include "precompute/warp/ventilation.h"
+#include "program/command/deform_content.h"
 
 /* A line of the table: a lung or a label. */
 typedef struct part {
