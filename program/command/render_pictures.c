@@ -167,7 +167,7 @@ static void tell_target(studio *s, size_t i) {
   const supine_target *t = &shown->marks.selected;
   char target[SUPINE_SHOWN_NAME_SIZE];
   shown->note[0] = '\0';
-  if (t->moved < 0.05) {
+  if (t->moved < 0.05 && !(t->moved_error > 0.0)) {
     (void)supine_print_text(shown->subtitle, sizeof shown->subtitle, "where %s is",
                             supine_options_shown_name(t->name, 36, target));
     return;

@@ -343,7 +343,7 @@ static void add_label(const appearance *look, const supine_target *t, supine_opt
   (void)supine_print_text(marks->label[look->part], sizeof marks->label[look->part], "%s",
                           supine_options_shown_name(t->name, 28, label));
   if (t->moved > t->moved_error && look->kind == SUPINE_MARK_TARGET) {
-    supine_text_add(marks->label[look->part], sizeof marks->label[look->part], " %.1f mm",
+    supine_text_add(marks->label[look->part], sizeof marks->label[look->part], ": %.1f mm",
                     t->moved);
   }
   middle->label = marks->label[look->part];
@@ -351,7 +351,7 @@ static void add_label(const appearance *look, const supine_target *t, supine_opt
   middle->tint = look->tint;
   middle->moved =
       t->moved > t->moved_error || (look->kind == SUPINE_MARK_SELECTED && t->moved > 0.05);
-  middle->expected = t->moved_error > 0.0 && t->moved >= 0.05 ? (float)t->moved_error : 0.0F;
+  middle->expected = t->moved_error > 0.0 ? (float)t->moved_error : 0.0F;
 }
 
 /* Make the marks of a structure: of its vertices, and of its middle, which has the label. */
@@ -359,11 +359,13 @@ static void fill_marks(const supine_options_names *names, const appearance *look
                        const supine_target *t, const float *after, const float *before,
                        supine_options_marks *marks) {
   static const float point_radius = 7.0F; /* radius of the ball of a single point, mm */
+  static const float other_radius = 3.5F; /* of a point without a label beside it, mm */
   static const float cloud_radius = 1.5F; /* of each of several points of one name, mm */
   static const double least = 0.05;       /* smallest displacement that is shown, mm */
   const size_t begin = names->begin[look->part];
   const size_t count = names->begin[look->part + 1] - begin;
-  double reach = count == 1 ? (double)point_radius : 0.0;
+  const float single_radius = look->named ? point_radius : other_radius;
+  double reach = count == 1 ? (double)single_radius : 0.0;
   for (size_t i = begin; i < begin + count; ++i) {
     const size_t vertex = names->order[i];
     supine_mark *mark = &marks->mark[vertex];
@@ -372,7 +374,7 @@ static void fill_marks(const supine_options_names *names, const appearance *look
     const double off[3] = {(double)mark->xyz[0] - t->at[0], (double)mark->xyz[1] - t->at[1],
                            (double)mark->xyz[2] - t->at[2]};
     reach = fmax(reach, supine_length(off));
-    mark->radius = count == 1 ? point_radius : cloud_radius;
+    mark->radius = count == 1 ? single_radius : cloud_radius;
     mark->kind = look->kind;
     mark->tint = look->tint;
     mark->moved = t->moved >= least;

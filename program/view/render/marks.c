@@ -12,7 +12,7 @@
 #define FUNCTIONS(EACH)                                                                            \
   EACH(cairo_, arc) EACH(cairo_, close_path) EACH(cairo_, fill) EACH(cairo_, fill_preserve)        \
   EACH(cairo_, line_to) EACH(cairo_, move_to) EACH(cairo_, new_path) EACH(cairo_, rectangle)       \
-  EACH(cairo_, set_dash)                                                                           \
+  EACH(cairo_, set_dash) EACH(cairo_, set_line_join)                                               \
   EACH(cairo_, set_line_width) EACH(cairo_, set_source_rgb) EACH(cairo_, set_source_rgba)          \
   EACH(cairo_, stroke) EACH(cairo_, stroke_preserve)
 /* clang-format on */
@@ -141,6 +141,17 @@ static bool crosses(const double a[2], const double b[2], const double box[4]) {
   return false;
 }
 
+/* Return twice the signed area of the triangle a, b, c. */
+static double turn(const double a[2], const double b[2], const double c[2]) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/* Return whether the lines from `a` to `b` and from `c` to `d` cross. */
+static bool lines_cross(const double a[2], const double b[2], const double c[2],
+                        const double d[2]) {
+  return turn(a, b, c) * turn(a, b, d) < 0.0 && turn(c, d, a) * turn(c, d, b) < 0.0;
+}
+
 /* Return whether a mark is that of a large structure, on which its name is written. */
 static bool is_shell(const shown *m) {
   return m->mark->kind == SUPINE_MARK_ANATOMY;
@@ -170,6 +181,7 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
       cost += apart ? 0.0 : 4.0;
       cost += crosses(s->mark[own].at, end, m->box) ? 2.0 : 0.0;
       cost += crosses(m->at, other, box) ? 2.0 : 0.0;
+      cost += lines_cross(s->mark[own].at, end, m->at, other) ? 2.0 : 0.0;
     }
   }
   const bool inside = box[0] >= 0.0 && box[2] <= s->width && box[1] >= 0.0 && box[3] <= s->height;
@@ -233,6 +245,7 @@ static void name(const sketch *s, const shown *m) {
   supine_render_letters_path(s->cr, &s->face, left, middle + 0.35 * size, m->mark->label);
   cairo.set_source_rgba(s->cr, ground[0], ground[1], ground[2], 0.85);
   cairo.set_line_width(s->cr, size * 0.25);
+  cairo.set_line_join(s->cr, CAIRO_LINE_JOIN_ROUND); /* a mitre would grow spikes on an M */
   cairo.stroke_preserve(s->cr);
   colour(s->cr, s->style->ink);
   cairo.fill(s->cr);
@@ -298,7 +311,7 @@ supine_status supine_render_marks_draw(cairo_t *cr, const marks_style *style,
     if (m->ring > 0.0) {
       ring(&s, m);
     }
-    if (m->arrow && m->mark->kind == SUPINE_MARK_SELECTED) {
+    if (m->mark->moved && m->mark->kind == SUPINE_MARK_SELECTED) {
       ghost(&s, m);
     }
     if (m->arrow) {
