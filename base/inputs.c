@@ -80,7 +80,7 @@ static const supine_input inputs[] = {
     .told = NAN, .refused = 0, .evidence = TEXT("definition"),
     .interfaces = SUPINE_INPUT_BY_JAVASCRIPT | SUPINE_INPUT_BY_PYTHON},
   [SUPINE_INPUT_POINT_OUTSIDE] = {
-    .name = TEXT("point-outside"), .group = TEXT("Points"), .input = TEXT("a point, such as a nodule"),
+    .name = TEXT("point-outside"), .group = TEXT("Points"), .input = TEXT("a point, such as a nodule, or the nearest vertex of a mesh; one far vertex is told"),
     .against = TEXT("the surface of the lungs"), .measured = TEXT("distance outside, mm"),
     .told = NAN, .refused = 60, .evidence = TEXT("assumed: beyond ribs and chest wall"),
     .interfaces = SUPINE_INPUT_BY_COMMAND | SUPINE_INPUT_BY_PYTHON},

@@ -150,6 +150,49 @@ static void find_box(const supine_inside_shells *shells, double low[3], double h
   }
 }
 
+/* Return whether a point lies between the lungs. */
+static bool is_between(const embedding *e, const double low[3], const double high[3],
+                       const double point[3]) {
+  const char *name = supine_basis_get_info(e->shells->basis)->lung_names[0];
+  const int single = name[0] == 'l' ? 1 : -1;
+  return supine_lungs_is_between(low, high, e->shells->count == 2 ? 0 : single, point);
+}
+
+/* Warn of the vertex of a mesh that is farthest outside the lungs, if it is as far as points must
+ * not be. Airways go on so far between the lungs, but in short steps. */
+static void check_strays(const embedding *e, const double low[3], const double high[3],
+                         supine_findings *findings) {
+  const supine_inside_content *content = e->content;
+  double most = 0.0;
+  double farthest = 0.0;
+  size_t part = 0;
+  for (size_t i = 0; i < 3 * content->triangle_count; ++i) {
+    const size_t first = i - i % 3;
+    const size_t vertex = content->triangles[i];
+    const double *point = content->points + 3 * vertex;
+    double step = INFINITY;
+    for (size_t k = 1; k < 3; ++k) {
+      const size_t next = content->triangles[first + (i + k) % 3];
+      step = fmin(step, supine_distance(point, content->points + 3 * next));
+    }
+    const double outside = -e->place[vertex].depth;
+    const double counted = is_between(e, low, high, point) ? fmin(step, outside) : outside;
+    if (counted > most) {
+      most = counted;
+      farthest = outside;
+      part = content->part[vertex];
+    }
+  }
+  if (supine_input_judge(SUPINE_INPUT_POINT_OUTSIDE, most) != SUPINE_INPUT_TAKEN) {
+    char text[96] = "";
+    add_name(content->names, part, text, sizeof text);
+    supine_findings_warn(findings,
+                         "a vertex of %s is %.0f mm outside the lungs of the basis: check the mesh "
+                         "for stray vertices and pieces",
+                         text, farthest);
+  }
+}
+
 /* Warn of parts that lie outside the lungs and not between them, as those of another person do. A
  * coarse surface cuts corners off the lungs, by up to about its edge length. */
 static void check_belonging(const embedding *e, supine_findings *findings) {
@@ -161,30 +204,33 @@ static void check_belonging(const embedding *e, supine_findings *findings) {
                          100.0 * seen);
   }
   const supine_inside_content *content = e->content;
-  const supine_basis_info *info = supine_basis_get_info(e->shells->basis);
-  const int single = info->lung_names[0][0] == 'l' ? 1 : -1;
   double low[3];
   double high[3];
   find_box(e->shells, low, high);
   if (e->options->clamp || content->part_count == 0) {
     return;
   }
+  bool taken = true;
   supine_lungs_belong points = {.rim = SUPINE_LUNGS_RIM + e->shells->shell[0].edge};
   for (size_t begin = 0, end = 0; begin < content->count; begin = end) {
     supine_lungs_belong part = {.rim = points.rim};
     end = end_of_part(content, begin);
     for (size_t i = begin; i < end; ++i) {
-      const bool between = supine_lungs_is_between(low, high, e->shells->count == 2 ? 0 : single,
-                                                   content->points + 3 * i);
+      const bool between = is_between(e, low, high, content->points + 3 * i);
       supine_lungs_belong_add(end == begin + 1 ? &points : &part,
                               between ? 0.0 : e->place[i].depth);
     }
     char text[96] = "vertices of ";
     add_name(content->names, content->part[begin], text, sizeof text);
-    (void)supine_lungs_belong_judge(&part, SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis", findings);
+    taken = supine_lungs_belong_judge(&part, SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis",
+                                      findings) == SUPINE_INPUT_TAKEN &&
+            taken;
   }
   (void)supine_lungs_belong_judge(&points, SUPINE_INPUT_CONTENT_OUTSIDE, "points", "basis",
                                   findings);
+  if (taken) {
+    check_strays(e, low, high, findings);
+  }
 }
 
 /* List the ranges of points that belong to one rigid piece. */

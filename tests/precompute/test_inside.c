@@ -800,6 +800,63 @@ static void add_box(supine_inside_content *content, const char *name, const doub
   assert_int_equal(supine_inside_content_surface(name, &mesh, content, NULL), SUPINE_OK);
 }
 
+/* Append a tube of triangles along z as one part: rings of 8 vertices, 5 mm apart. */
+static void add_tube(supine_inside_content *content, double x, double low, double high) {
+  enum { AROUND = 8, RINGS = 100 };
+  double vertices[3 * AROUND * RINGS];
+  uint32_t triangles[6 * AROUND * RINGS];
+  const size_t rings = (size_t)((high - low) / 5.0);
+  supine_mesh mesh = {.vertices = vertices, .triangles = triangles};
+  assert_true(rings <= RINGS);
+  for (size_t i = 0; i < AROUND * rings; ++i) {
+    const double angle = 2.0 * acos(-1.0) / AROUND * (double)(i % AROUND);
+    const double row[3] = {x + 6.0 * cos(angle), 6.0 * sin(angle),
+                           low + 5.0 * (double)(i / AROUND)};
+    memcpy(vertices + 3 * mesh.vertex_count++, row, sizeof row);
+  }
+  for (size_t i = 0; i < AROUND * (rings - 1); ++i) {
+    const size_t next = i % AROUND == AROUND - 1 ? i + 1 - AROUND : i + 1;
+    const size_t corner[6] = {i, next, i + AROUND, next, next + AROUND, i + AROUND};
+    for (size_t k = 0; k < 6; ++k) {
+      triangles[3 * mesh.triangle_count + k] = (uint32_t)corner[k];
+    }
+    mesh.triangle_count += 2;
+  }
+  assert_int_equal(supine_inside_content_surface("tube", &mesh, content, NULL), SUPINE_OK);
+}
+
+/* A trachea leaves the lungs between them. One vertex of it, or of an airway in a lung, that lies
+ * far from all others is told of. */
+TEST(test_embed_one_vertex_far_from_the_others_told) {
+  static const struct {
+    double x, low, high; /* the tube */
+    double far[3];       /* where its vertex 40 is; at {0} it stays in its place */
+  } tubes[] = {{0.0, -40.0, 350.0, {0.0}},
+               {71.0, -60.0, 0.0, {0.0}},
+               {0.0, -40.0, 350.0, {0.0, 0.0, 900.0}},
+               {0.0, -40.0, 350.0, {0.0, 0.0, -300.0}},
+               {71.0, -60.0, 0.0, {300.0, 0.0, 0.0}},
+               {71.0, -60.0, 0.0, {71.0, 1e7, 0.0}}};
+  for (size_t i = 0; i < sizeof tubes / sizeof *tubes; ++i) {
+    supine_inside_content content = {0};
+    add_tube(&content, tubes[i].x, tubes[i].low, tubes[i].high);
+    const bool far = supine_dot(tubes[i].far, tubes[i].far) > 0.0;
+    if (far) {
+      memcpy(content.points + (size_t)3 * 40, tubes[i].far, sizeof tubes[i].far);
+    }
+    const supine_inside_report report = embed(&content, false, 0);
+    const supine_inside_place place =
+        supine_lungs_surface_find(shells.shell[0].surface, content.points + (size_t)3 * 40, NULL);
+    assert_true(!far || place.depth < -60.0);
+    assert_int_equal(report.findings.count, far ? 1 : 0);
+    if (far) {
+      assert_says(report.findings.list[0].text, "a vertex of 'tube' is");
+      assert_says(report.findings.list[0].text, "stray vertices");
+    }
+    supine_inside_content_free(&content);
+  }
+}
+
 /* Parts that are open, or larger than a fifth of a lung, are anatomy: those whose longest side is
  * the diameter of such a ball, however thin they are, and those that enclose as much. */
 TEST(test_embed_parts_large_or_open_are_anatomy) {
