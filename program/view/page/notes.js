@@ -118,7 +118,7 @@ class Notes {
   }
 
   /** Draw a target's name, in a colour, and a line from it to the target. A name that would cover a taken box moves
-   * down, up or to the other side. */
+   * down, up or to the other side; without a free place it is left to the table. */
   name(at, lines, { width, height }, colour) {
     const { context, taken } = this;
     const wide = Math.max(
@@ -127,8 +127,9 @@ class Notes {
         return context.measureText(line).width;
       }),
     );
-    let side = at[0] + 70 + wide < width ? 1 : -1;
-    const place = [at[0] + side * 60, at[1] + 4];
+    const away = width < LENS_WIDE ? 30 : 60;
+    let side = at[0] + away + 10 + wide < width ? 1 : -1;
+    const place = [at[0] + side * away, at[1] + 4];
     const box = () => [
       place[0] - (side < 0 ? wide : 0),
       place[1] - 9,
@@ -137,13 +138,15 @@ class Notes {
     ];
     const covers = ([left, top, right, bottom]) =>
       left < box()[2] && right > box()[0] && top < box()[3] && bottom > box()[1];
-    const fits = () => !taken.some(covers) && box()[0] > 0 && box()[1] > 0 && box()[3] < height;
+    const inside = ([left, top, right, bottom]) => left > 0 && top > 0 && right < width && bottom < height;
+    const fits = () => inside(box()) && !taken.some(covers);
     for (let steps = 1; steps < 200 && !fits(); ++steps) {
       // near the target on either side first, then farther
       if (steps % 2 === 0) side = -side;
-      place[0] = at[0] + side * 60;
+      place[0] = at[0] + side * away;
       place[1] = at[1] + 4 + 8 * Math.ceil(steps / 4) * (steps % 4 < 2 ? 1 : -1);
     }
+    if (!fits()) return;
     taken.push(box());
     context.strokeStyle = css('--soft');
     context.lineWidth = 1;

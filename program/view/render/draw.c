@@ -152,19 +152,28 @@ static float fade_at(const canvas *c, size_t sample) {
   return smoothstep(0.0F, share, fminf(x, 1.0F - x)) * smoothstep(0.0F, share, fminf(y, 1.0F - y));
 }
 
-/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them; of
- * the torso, which is drawn first, only the nearest fragment stays. */
+/* Draw a fragment over what the sample shows. Only opaque fragments hide what is behind them, and
+ * what is translucent covers them less, so that a target stays bright behind several lobes; of the
+ * torso, which is drawn first, only the nearest fragment stays. */
 static void blend(const canvas *c, size_t sample, material what, const fragment *at,
                   float nearness) {
+  static const float veil = 0.4F; /* share of a translucent fragment that covers an opaque one */
   float rgba[4];
   float *under = c->rgba[sample];
   const bool torso = what == MATERIAL_BODY;
-  const float fade = torso ? fade_at(c, sample) : 1.0F;
   supine_render_shade(c->shades, what, at, rgba);
-  for (int k = 0; k < 4; ++k) {
-    under[k] = torso ? fade * rgba[k] : rgba[k] + (1.0F - rgba[3]) * under[k];
+  const bool opaque = rgba[3] >= 1.0F;
+  float share = 1.0F;
+  if (torso) {
+    share = fade_at(c, sample);
+  } else if (!opaque && c->nearness[sample] > 0.0F) {
+    share = veil;
   }
-  if (torso || rgba[3] >= 1.0F) {
+  const float left = torso ? 0.0F : 1.0F - share * rgba[3];
+  for (int k = 0; k < 4; ++k) {
+    under[k] = share * rgba[k] + left * under[k];
+  }
+  if (torso || opaque) {
     c->nearness[sample] = nearness;
   }
 }
