@@ -13,6 +13,7 @@
 #include "runtime/checks.h"
 #include "runtime/clusters.h"
 #include "runtime/kriging.h"
+#include "runtime/lung.h"
 #include "runtime/safetensors/safetensors_file.h"
 #include "runtime/simulated.h"
 
@@ -357,10 +358,7 @@ static supine_status read_numbers(const check *c, const char *key, size_t count,
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
   for (size_t t = 0; t < info->triangle_count;) {
-    size_t lung = 0;
-    while (info->triangles[3 * t] >= info->lung_begin[lung + 1]) {
-      ++lung;
-    }
+    const size_t lung = supine_basis_lung_of(info, info->triangles[3 * t]);
     const float *origin = info->vertices + 3 * info->lung_begin[lung];
     double volume = basis->reference_volume[lung];
     for (; t < info->triangle_count && info->triangles[3 * t] >= info->lung_begin[lung] &&

@@ -8,6 +8,7 @@
 #include "base/vec3.h"
 #include "runtime/doubt_volume.h"
 #include "runtime/internal.h"
+#include "runtime/lung.h"
 
 /* Return the number of nodes of the grid, or 0 if the basis is none. */
 static size_t count_nodes(const supine_basis *basis, size_t size[3]) {
@@ -63,15 +64,6 @@ void supine_doubt_area(const float *xyz, const uint32_t *triangle, double area[3
   supine_cross(side[0], side[1], area);
 }
 
-/* Return the lung of a vertex. */
-static size_t lung_of(const supine_basis_info *info, size_t vertex) {
-  size_t lung = 0;
-  while (vertex >= info->lung_begin[lung + 1]) {
-    ++lung;
-  }
-  return lung;
-}
-
 /* Add the volume inside the surface, and its gradient unless NULL. */
 static void add_surface(const supine_basis *basis, const float *xyz, double *volume,
                         float *gradient) {
@@ -81,7 +73,7 @@ static void add_surface(const supine_basis *basis, const float *xyz, double *vol
     const float *corner = xyz + 3 * (size_t)triangle[0];
     double area[3];
     supine_doubt_area(xyz, triangle, area);
-    const size_t lung = lung_of(info, triangle[0]);
+    const size_t lung = supine_basis_lung_of(info, triangle[0]);
     for (size_t k = 0; k < 3; ++k) { /* relative to the first vertex of the lung, for precision */
       const double from = (double)xyz[3 * info->lung_begin[lung] + k];
       volume[lung] += area[k] * ((double)corner[k] - from) / 6;
@@ -199,7 +191,7 @@ static void add_grid(const supine_doubt_shape *s, const float *xyz, double *volu
     if (!(share > 0)) {
       continue;
     }
-    const size_t lung = lung_of(info, corners[0]);
+    const size_t lung = supine_basis_lung_of(info, corners[0]);
     for (size_t t = 0; t < 6; ++t) { /* all have the diagonal from corner 0 to corner 7 */
       const size_t corner[4] = {corners[0], corners[paths[t][0]], corners[paths[t][1]], corners[7]};
       add_tetrahedron(xyz, corner, share, &volume[lung], gradient);

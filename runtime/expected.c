@@ -11,6 +11,7 @@
 #include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/internal.h"
+#include "runtime/lung.h"
 
 const double supine_expected_shift = 0.01;
 
@@ -296,15 +297,12 @@ static void evaluate_collapse(const supine_expected_model *m, size_t begin, size
                               supine_expected_block *b) {
   const supine_basis *basis = m->basis;
   const float *vertices = supine_basis_vertices(basis) + 3 * begin;
-  size_t lung = 0;
   memset(b->collapse, 0, sizeof b->collapse);
   if (basis->info.hilum == NULL) {
     return;
   }
   for (size_t i = 0; i < end - begin; ++i) {
-    while (begin + i >= basis->info.lung_begin[lung + 1]) {
-      ++lung;
-    }
+    const size_t lung = supine_basis_lung_of(&basis->info, begin + i);
     for (size_t pose = 0; pose < 2; ++pose) {
       const double e = pose == 0 ? m->collapse[lung][0] : -m->collapse[lung][1];
       for (size_t k = 0; k < 3; ++k) {

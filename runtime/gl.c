@@ -5,6 +5,7 @@
 #include "runtime/clusters.h"
 #include "runtime/internal.h"
 #include "runtime/kernels/compact.h"
+#include "runtime/lung.h"
 
 _Static_assert((int)SUPINE_GL_FRAME_FLOATS == (int)SUPINE_CLUSTER_FRAME,
                "the texture has whole frames");
@@ -20,17 +21,13 @@ supine_status supine_gl_pack(const supine_basis *basis, size_t begin, size_t end
   const bool vector = basis->info.vector;
   const size_t head = vector ? SUPINE_GL_VECTOR_FLOATS : SUPINE_GL_FLOATS;
   const size_t count = (vector ? 3 : 1) * basis->info.mode_count;
-  size_t lung = 0;
   if (!fits(basis)) {
     return SUPINE_ERROR_UNSUPPORTED;
   }
   for (size_t i = begin; i < end; ++i) {
     float *to = attributes + (i - begin) * (head + count);
-    while (i >= basis->lung_begin[lung + 1]) {
-      ++lung;
-    }
     memcpy(to, basis->info.vertices + 3 * i, 3 * sizeof *to);
-    to[3] = (float)lung;
+    to[3] = (float)supine_basis_lung_of(&basis->info, i);
     if (!vector) {
       memcpy(to + 4, basis->info.direction + 3 * i, 3 * sizeof *to);
     }

@@ -11,6 +11,7 @@
 #include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/location.h"
+#include "runtime/lung.h"
 #include "runtime/rigid.h"
 #include "runtime/sight.h"
 #include "runtime/simulated.h"
@@ -156,12 +157,10 @@ static supine_status initialise(workspace *s, supine_error *error) {
   if (status == SUPINE_OK) {
     for (size_t j = 0; j < task->count; ++j) {
       supine_kriging_point *p = &s->points[j];
-      *p = (supine_kriging_point){.noise = task->observed[j].noise,
+      *p = (supine_kriging_point){.lung = supine_basis_lung_of(info, task->observed[j].vertex),
+                                  .noise = task->observed[j].noise,
                                   .on_line = task->observed[j].on_line};
       position(basis, &pose, task->observed[j].vertex, p->position);
-      while (task->observed[j].vertex >= info->lung_begin[p->lung + 1]) {
-        ++p->lung;
-      }
     }
   }
   *s->fit = (supine_location){

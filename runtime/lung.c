@@ -1,8 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* The lungs that a state names, the weights of one lung, and its volume as a polynomial. */
+/* The lung of a vertex, the lungs that a state names, the weights of one lung, and its volume as a
+ * polynomial. */
 #include <string.h>
 
 #include "runtime/internal.h"
+#include "runtime/lung.h"
+
+size_t supine_basis_lung_of(const supine_basis_info *info, size_t vertex) {
+  size_t lung = 0;
+  while (vertex >= info->lung_begin[lung + 1]) {
+    ++lung;
+  }
+  return lung;
+}
 
 const double *supine_basis_lung_weights(const supine_basis *basis, const supine_pose *pose,
                                         size_t lung) {

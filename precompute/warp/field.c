@@ -8,6 +8,7 @@
 #include "base/vec3.h"
 
 #include "precompute/warp/fade.h"
+#include "runtime/lung.h"
 
 const double supine_warp_aerated = -300.0;
 
@@ -152,7 +153,6 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
   for (size_t i = 0; i < count; ++i) {
     below[i] = -INFINITY;
   }
-  size_t of = 0; /* lung of the node; the nodes of a lung follow those of the lungs before it */
   /* The field gives displacements from the scan, but info->vertices are at full inflation. */
   for (size_t i = 0; i < n; ++i) {
     double node[3];
@@ -162,10 +162,7 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
           (float)((double)info->vertices[3 * i + k] - node[k] + (double)moved[3 * i + k]);
     }
     known[part[i]] = 1;
-    while (i >= info->lung_begin[of + 1]) {
-      ++of;
-    }
-    lung[part[i]] = (unsigned char)of;
+    lung[part[i]] = (unsigned char)supine_basis_lung_of(info, i);
     below[part[i]] = depth[i];
   }
   supine_warp_fade_out(&made, known);

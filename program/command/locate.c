@@ -17,6 +17,7 @@
 #include "program/options/markups.h"
 #include "program/options/state_options.h"
 #include "program/options/surface_options.h"
+#include "runtime/lung.h"
 
 static const char name[] = "locate";
 
@@ -244,7 +245,7 @@ static supine_status finish_points(const request *wanted, const supine_basis *in
     const float *p = located->xyz + 3 * at;
     supine_csv_row row = {.file = output.file};
     supine_csv_add_text(&row, names->text[names->part[at]]);
-    supine_csv_add_text(&row, info->lung_names[supine_options_lung_of(info, at)]);
+    supine_csv_add_text(&row, info->lung_names[supine_basis_lung_of(info, at)]);
     supine_csv_add(&row, "%.3f,%.3f,%.3f,%.3f", (double)p[0], (double)p[1], (double)p[2],
                    (double)located->sigma[at]);
     supine_csv_end_row(&row);

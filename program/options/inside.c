@@ -13,6 +13,7 @@
 #include "program/options/basis_input.h"
 #include "program/options/inside.h"
 #include "runtime/checks.h"
+#include "runtime/lung.h"
 
 /* Sort the vertices by structure, then in input order. */
 static supine_status sort_by_name(supine_options_names *names, size_t n, supine_error *error) {
@@ -89,14 +90,6 @@ supine_status supine_options_names_open(const supine_basis *basis, supine_option
 
 void supine_options_names_close(supine_options_names *names) {
   supine_arena_free(&names->arena);
-}
-
-size_t supine_options_lung_of(const supine_basis_info *info, size_t vertex) {
-  size_t lung = 0;
-  while (vertex >= info->lung_begin[lung + 1]) {
-    ++lung;
-  }
-  return lung;
 }
 
 supine_status supine_options_inside_open(const supine_basis *lungs, const char *path,
@@ -202,7 +195,7 @@ supine_status supine_options_targets_find(const supine_basis *inside,
     const size_t end = each ? i + 1 : names->begin[i + 1];
     if (end > begin) {
       (*targets)[i] = average(names, begin, end, after, before, errors);
-      (*targets)[i].lung = supine_options_lung_of(info, names->order[begin]);
+      (*targets)[i].lung = supine_basis_lung_of(info, names->order[begin]);
     } else { /* a name may have no vertices */
       (*targets)[i].name = names->text[i];
     }

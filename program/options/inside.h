@@ -26,9 +26,6 @@ supine_status supine_options_names_open(const supine_basis *basis, supine_option
                                         supine_error *error);
 void supine_options_names_close(supine_options_names *names);
 
-/* Return the index of the lung that a vertex belongs to. */
-size_t supine_options_lung_of(const supine_basis_info *info, size_t vertex);
-
 /* Open the basis file of embedded structures, read their names, and check that they were embedded
  * in `lungs`. Initialise *inside and *names to zero before the call; close both after it, even if
  * it fails. */
