@@ -7,6 +7,7 @@
 #include "base/vec3.h"
 #include "runtime/doubt.h"
 #include "runtime/internal.h"
+#include "runtime/lung.h"
 
 enum { STATES = SUPINE_DOUBT_STATES_MAX, SWEEPS = 40 };
 
@@ -240,26 +241,22 @@ static void find_features(const supine_doubt *d, size_t begin, size_t i, const f
   }
 }
 
-void supine_doubt_evaluate(const supine_doubt *d, size_t state, size_t begin, size_t end,
-                           supine_doubt_features *features) {
+/* Evaluate vertices begin <= i < end, at most DOUBT_BLOCK; those of located lungs are of one lung.
+ */
+static void evaluate(const supine_doubt *d, size_t state, size_t begin, size_t end,
+                     supine_doubt_features *features) {
   const float *vertices = supine_basis_vertices(d->basis) + 3 * begin;
   const supine_basis_info *info = supine_basis_get_info(d->basis);
   supine_location_block block;
-  size_t lung = 0;
-  while (begin >= info->lung_begin[lung + 1]) {
-    ++lung;
-  }
   if (d->location != NULL) {
-    supine_location_evaluate(d->location, d->model, lung, begin, end, &block);
+    supine_location_evaluate(d->location, d->model, supine_basis_lung_of(info, begin), begin, end,
+                             &block);
   } else {
     supine_expected_evaluate(&d->model[state], begin, end, &block.formula);
   }
   for (size_t i = 0; i < end - begin; ++i) {
     supine_doubt_features *f = &features[i];
-    while (begin + i >= info->lung_begin[lung + 1]) {
-      ++lung;
-    }
-    *f = (supine_doubt_features){.state = state, .lung = lung};
+    *f = (supine_doubt_features){.state = state, .lung = supine_basis_lung_of(info, begin + i)};
     find_features(d, begin, i, vertices + 3 * i, &block.formula, f);
     if (d->location != NULL) {
       follow_location(d->location, &block, i, f);
@@ -269,7 +266,16 @@ void supine_doubt_evaluate(const supine_doubt *d, size_t state, size_t begin, si
 
 void supine_doubt_evaluate_one(const supine_doubt *doubt, const supine_doubt_point *point,
                                supine_doubt_features *features) {
-  supine_doubt_evaluate(doubt, point->state, point->vertex, point->vertex + 1, features);
+  evaluate(doubt, point->state, point->vertex, point->vertex + 1, features);
+}
+
+const supine_doubt_features *supine_doubt_at(supine_doubt_walk *walk, size_t vertex) {
+  if (vertex >= walk->last) {
+    walk->first = vertex;
+    walk->last = walk->end - vertex < DOUBT_BLOCK ? walk->end : vertex + DOUBT_BLOCK;
+    evaluate(walk->doubt, walk->state, walk->first, walk->last, walk->features);
+  }
+  return &walk->features[vertex - walk->first];
 }
 
 double supine_doubt_kernel(const double a[3], size_t a_lung, const double b[3], size_t b_lung) {

@@ -8,7 +8,10 @@
 
 #include "runtime/location.h"
 
-enum { DOUBT_VECTORS = 4 }; /* assumed volume, heart, sliding, collapse */
+enum {
+  DOUBT_VECTORS = 4, /* assumed volume, heart, sliding, collapse */
+  DOUBT_BLOCK = 32   /* vertices whose features are evaluated at once */
+};
 
 struct supine_doubt {
   const supine_basis *basis;
@@ -37,9 +40,19 @@ typedef struct supine_doubt_features {
   double vector[DOUBT_VECTORS][3]; /**< vectors whose products are covariances, mm */
 } supine_doubt_features;
 
-/** Evaluate vertices begin <= i < end of one lung, at most LOCATE_BLOCK. */
-void supine_doubt_evaluate(const supine_doubt *doubt, size_t state, size_t begin, size_t end,
-                           supine_doubt_features *features);
+/** The features of consecutive vertices, of one lung if the field is that of located lungs.
+ * Initialise `doubt`, `state` and `end`. */
+typedef struct supine_doubt_walk {
+  const supine_doubt *doubt;
+  size_t state;
+  size_t end;         /**< the vertex after the last one */
+  size_t first, last; /**< vertices first <= i < last are in `features` */
+  supine_doubt_features features[DOUBT_BLOCK];
+} supine_doubt_walk;
+
+/** Return the features of the vertex at which a walk has arrived. They are evaluated in blocks, and
+ * last until the next call. */
+const supine_doubt_features *supine_doubt_at(supine_doubt_walk *walk, size_t vertex);
 
 /** Evaluate one vertex. */
 void supine_doubt_evaluate_one(const supine_doubt *doubt, const supine_doubt_point *point,

@@ -254,16 +254,12 @@ static double square_after(const supine_doubt_frame *f, const supine_doubt_featu
 
 supine_status supine_doubt_frame_errors(const supine_doubt_frame *frame, size_t begin, size_t end,
                                         float *sigma) {
-  supine_doubt_features features[LOCATE_BLOCK];
+  supine_doubt_walk walk = {.doubt = frame->doubt, .end = end};
   if (end > supine_basis_get_info(frame->doubt->basis)->vertex_count) {
     return SUPINE_ERROR_ARGUMENT;
   }
-  for (size_t at = begin; at < end; at += LOCATE_BLOCK) {
-    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
-    supine_doubt_evaluate(frame->doubt, 0, at, last, features);
-    for (size_t i = 0; i < last - at; ++i) {
-      sigma[at - begin + i] = (float)sqrt(square_after(frame, &features[i]));
-    }
+  for (size_t i = begin; i < end; ++i) {
+    sigma[i - begin] = (float)sqrt(square_after(frame, supine_doubt_at(&walk, i)));
   }
   return SUPINE_OK;
 }

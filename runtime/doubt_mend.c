@@ -102,16 +102,11 @@ static void add_vertex(const supine_doubt_mend *m, const float *box, const float
  * that have any then come first. */
 static void gather(const supine_doubt_mend *m, size_t state, covariation *c) {
   const supine_basis_info *info = supine_basis_get_info(m->doubt->basis);
-  supine_doubt_features features[LOCATE_BLOCK];
-  const size_t end = info->lung_begin[c->lung + 1];
+  supine_doubt_walk walk = {m->doubt, state, .end = info->lung_begin[c->lung + 1]};
   memset(m->cells, 0, CELLS * sizeof *m->cells);
   memset(c->through, 0, sizeof c->through);
-  for (size_t at = info->lung_begin[c->lung]; at < end; at += LOCATE_BLOCK) {
-    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
-    supine_doubt_evaluate(m->doubt, state, at, last, features);
-    for (size_t i = at; i < last; ++i) {
-      add_vertex(m, info->bounds + 6 * c->lung, m->gradient + 3 * i, &features[i - at], c);
-    }
+  for (size_t i = info->lung_begin[c->lung]; i < walk.end; ++i) {
+    add_vertex(m, info->bounds + 6 * c->lung, m->gradient + 3 * i, supine_doubt_at(&walk, i), c);
   }
   c->used = 0;
   for (size_t i = 0; i < CELLS; ++i) {
@@ -189,23 +184,18 @@ static void covary(const supine_doubt_mend *m, const covariation *c, const supin
 static void find_along(supine_doubt_mend *m, size_t state, size_t lung, double *products) {
   const supine_basis_info *info = supine_basis_get_info(m->doubt->basis);
   float *along = m->along + 3 * m->vertices * lung;
-  supine_doubt_features features[LOCATE_BLOCK];
   covariation c = {.lung = lung};
   gather(m, state, &c);
   if (m->doubt->seen != NULL) {
     see(m, &c);
   }
   for (size_t other = 0; other < m->lungs; ++other) {
-    const size_t end = info->lung_begin[other + 1];
+    supine_doubt_walk walk = {m->doubt, state, .end = info->lung_begin[other + 1]};
     products[other] = 0;
-    for (size_t at = info->lung_begin[other]; at < end; at += LOCATE_BLOCK) {
-      const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
-      supine_doubt_evaluate(m->doubt, state, at, last, features);
-      for (size_t i = at; i < last; ++i) {
-        covary(m, &c, &features[i - at], along + 3 * i);
-        for (size_t k = 0; k < 3; ++k) {
-          products[other] += (double)along[3 * i + k] * (double)m->gradient[3 * i + k];
-        }
+    for (size_t i = info->lung_begin[other]; i < walk.end; ++i) {
+      covary(m, &c, supine_doubt_at(&walk, i), along + 3 * i);
+      for (size_t k = 0; k < 3; ++k) {
+        products[other] += (double)along[3 * i + k] * (double)m->gradient[3 * i + k];
       }
     }
   }

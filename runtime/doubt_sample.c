@@ -162,29 +162,23 @@ static bool has_part(const supine_doubt *d, size_t state, size_t part) {
 static void add_part(const supine_doubt *d, size_t state, size_t part, size_t lung, const pair *p,
                      const prediction *seen, float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(d->basis);
-  const size_t end = info->lung_begin[lung + 1];
-  supine_doubt_features features[LOCATE_BLOCK];
-  for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
-    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
-    supine_doubt_evaluate(d, state, at, last, features);
-    for (size_t i = at; i < last; ++i) {
-      const supine_doubt_features *f = &features[i - at];
-      double error[AXES] = {0};
-      double shift[AXES] = {0};
-      double factor = 1;
-      if (part < d->state_count) {
-        add_pair(p, f->deviation * d->root[state][part], f->place, error);
-      } else if (part == d->state_count) {
-        add_pair(p, sqrt(supine_doubt_common_square(d)), f->place, error);
-      } else {
-        factor = f->seen_factor * d->root[state][part - first_seen(d)];
-        add_pair(p, supine_kriging_deviation(&d->seen->model, f->seen.size), f->seen.position,
-                 error);
-        supine_kriging_shift(d->seen, seen->weights, seen->terms, &f->seen, shift);
-      }
-      for (size_t k = 0; k < AXES; ++k) {
-        xyz[3 * i + k] += (float)(factor * (error[k] - shift[k]));
-      }
+  supine_doubt_walk walk = {d, state, .end = info->lung_begin[lung + 1]};
+  for (size_t i = info->lung_begin[lung]; i < walk.end; ++i) {
+    const supine_doubt_features *f = supine_doubt_at(&walk, i);
+    double error[AXES] = {0};
+    double shift[AXES] = {0};
+    double factor = 1;
+    if (part < d->state_count) {
+      add_pair(p, f->deviation * d->root[state][part], f->place, error);
+    } else if (part == d->state_count) {
+      add_pair(p, sqrt(supine_doubt_common_square(d)), f->place, error);
+    } else {
+      factor = f->seen_factor * d->root[state][part - first_seen(d)];
+      add_pair(p, supine_kriging_deviation(&d->seen->model, f->seen.size), f->seen.position, error);
+      supine_kriging_shift(d->seen, seen->weights, seen->terms, &f->seen, shift);
+    }
+    for (size_t k = 0; k < AXES; ++k) {
+      xyz[3 * i + k] += (float)(factor * (error[k] - shift[k]));
     }
   }
 }
@@ -192,18 +186,15 @@ static void add_part(const supine_doubt *d, size_t state, size_t part, size_t lu
 void supine_doubt_add_positions(const supine_doubt *d, size_t state, size_t lung,
                                 const double factor[DOUBT_VECTORS], float *xyz) {
   const supine_basis_info *info = supine_basis_get_info(d->basis);
-  const size_t end = info->lung_begin[lung + 1];
-  supine_doubt_features features[LOCATE_BLOCK];
-  for (size_t at = info->lung_begin[lung]; at < end; at += LOCATE_BLOCK) {
-    const size_t last = end - at < LOCATE_BLOCK ? end : at + LOCATE_BLOCK;
-    supine_doubt_evaluate(d, state, at, last, features);
-    for (size_t e = 3 * at; e < 3 * last; ++e) {
-      const supine_doubt_features *f = &features[e / 3 - at];
-      double sum = f->at[e % 3];
+  supine_doubt_walk walk = {d, state, .end = info->lung_begin[lung + 1]};
+  for (size_t i = info->lung_begin[lung]; i < walk.end; ++i) {
+    const supine_doubt_features *f = supine_doubt_at(&walk, i);
+    for (size_t k = 0; k < AXES; ++k) {
+      double sum = f->at[k];
       for (size_t v = 0; v < DOUBT_VECTORS; ++v) {
-        sum += factor[v] * f->vector[v][e % 3];
+        sum += factor[v] * f->vector[v][k];
       }
-      xyz[e] += (float)sum;
+      xyz[3 * i + k] += (float)sum;
     }
   }
 }
