@@ -316,18 +316,27 @@ void supine_doubt_covary(const supine_doubt *d, const supine_doubt_features *a,
   }
 }
 
+/* What the covariances of a point need. */
+typedef struct prepared {
+  supine_doubt_features features;
+  double *white; /* [observed points] of supine_doubt_whiten */
+} prepared;
+
+static void prepare_point(const supine_doubt *d, const supine_doubt_point *point, prepared *p) {
+  supine_doubt_evaluate_one(d, point, &p->features);
+  supine_doubt_whiten(d, &p->features, p->white);
+}
+
 /* Compute the covariance of two points: that of supine_doubt_covary, and the products of their
  * vectors; in the frame of the observations for located lungs. */
-static void covary(const supine_doubt *d, const supine_doubt_features *a, const double *a_white,
-                   const supine_doubt_features *b, double covariance[9]) {
+static void covary(const supine_doubt *d, const prepared *a, const prepared *b,
+                   double covariance[9]) {
   static const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double *r = d->location != NULL ? d->location->info.rotation : same;
-  double b_white[SUPINE_KRIGING_LANDMARKS_MAX];
   double body[9];
-  supine_doubt_whiten(d, b, b_white);
-  supine_doubt_covary(d, a, a_white, b, b_white, body);
+  supine_doubt_covary(d, &a->features, a->white, &b->features, b->white, body);
   for (size_t e = 0; e < 9 * (size_t)DOUBT_VECTORS; ++e) {
-    body[e % 9] += a->vector[e / 9][e % 9 / 3] * b->vector[e / 9][e % 3];
+    body[e % 9] += a->features.vector[e / 9][e % 9 / 3] * b->features.vector[e / 9][e % 3];
   }
   memset(covariance, 0, 9 * sizeof *covariance);
   for (size_t e = 0; e < 9 * 9; ++e) { /* R body R' */
@@ -335,11 +344,22 @@ static void covary(const supine_doubt *d, const supine_doubt_features *a, const 
   }
 }
 
+/* Write the predicted position of a point, in the frame of the observations for located lungs. */
+static void predict(const supine_doubt *d, const supine_doubt_features *f, double mean[3]) {
+  memcpy(mean, f->at, sizeof f->at);
+  if (d->location != NULL) {
+    supine_location_move(d->location, f->at, mean);
+  }
+}
+
+/* Points whose rows are computed together, so that the point of a column is prepared once for all,
+ * and the numbers that all their `white` may have: both bound the stack. */
+enum { ROWS = 32, WHITES = 4 * SUPINE_KRIGING_LANDMARKS_MAX };
+
 supine_status supine_doubt_covariance(const supine_doubt *doubt, size_t count,
                                       const supine_doubt_point *points, double *mean,
                                       double *covariance, supine_error *error) {
   const size_t n = supine_basis_get_info(doubt->basis)->vertex_count;
-  double white[SUPINE_KRIGING_LANDMARKS_MAX];
   for (size_t i = 0; i < count; ++i) {
     if (points[i].vertex >= n || points[i].state >= doubt->state_count) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
@@ -348,24 +368,31 @@ supine_status supine_doubt_covariance(const supine_doubt *doubt, size_t count,
                               i + 1, points[i].vertex, points[i].state, n, doubt->state_count);
     }
   }
-  for (size_t i = 0; i < count; ++i) {
-    supine_doubt_features a;
-    supine_doubt_evaluate_one(doubt, &points[i], &a);
-    supine_doubt_whiten(doubt, &a, white);
-    if (mean != NULL) {
-      memcpy(mean + 3 * i, a.at, sizeof a.at);
-      if (doubt->location != NULL) {
-        supine_location_move(doubt->location, a.at, mean + 3 * i);
+  prepared row[ROWS];
+  double whites[WHITES];
+  double white[SUPINE_KRIGING_LANDMARKS_MAX];
+  prepared column = {.white = white};
+  const size_t seen = doubt->seen != NULL ? doubt->seen->count : 0;
+  const size_t rows = ROWS * seen > WHITES ? WHITES / seen : ROWS;
+  for (size_t begin = 0; begin < count; begin += rows) {
+    const size_t end = count - begin < rows ? count : begin + rows;
+    for (size_t i = begin; i < end; ++i) {
+      prepared *p = &row[i - begin];
+      p->white = whites + (i - begin) * seen;
+      prepare_point(doubt, &points[i], p);
+      if (mean != NULL) {
+        predict(doubt, &p->features, mean + 3 * i);
       }
     }
-    for (size_t j = 0; j <= i; ++j) {
-      supine_doubt_features b;
-      double block[9];
-      supine_doubt_evaluate_one(doubt, &points[j], &b);
-      covary(doubt, &a, white, &b, block);
-      for (size_t e = 0; e < 9; ++e) {
-        covariance[(3 * i + e / 3) * 3 * count + 3 * j + e % 3] = block[e];
-        covariance[(3 * j + e % 3) * 3 * count + 3 * i + e / 3] = block[e];
+    for (size_t j = 0; j < end; ++j) {
+      prepare_point(doubt, &points[j], &column);
+      for (size_t i = j > begin ? j : begin; i < end; ++i) {
+        double block[9];
+        covary(doubt, &row[i - begin], &column, block);
+        for (size_t e = 0; e < 9; ++e) {
+          covariance[(3 * i + e / 3) * 3 * count + 3 * j + e % 3] = block[e];
+          covariance[(3 * j + e % 3) * 3 * count + 3 * i + e / 3] = block[e];
+        }
       }
     }
   }
