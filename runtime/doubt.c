@@ -241,8 +241,7 @@ static void find_features(const supine_doubt *d, size_t begin, size_t i, const f
   }
 }
 
-/* Evaluate vertices begin <= i < end, at most DOUBT_BLOCK; those of located lungs are of one lung.
- */
+/* Evaluate vertices begin <= i < end, at most DOUBT_BLOCK, and of one lung for located lungs. */
 static void evaluate(const supine_doubt *d, size_t state, size_t begin, size_t end,
                      supine_doubt_features *features) {
   const float *vertices = supine_basis_vertices(d->basis) + 3 * begin;

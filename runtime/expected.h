@@ -8,7 +8,7 @@
 
 #include "runtime/kriging.h"
 
-enum { LOCATE_BLOCK = 128 }; /**< number of vertices evaluated at once */
+enum { LOCATE_BLOCK = 64 }; /**< number of vertices evaluated at once */
 
 /* Relative standard deviation of an assumed volume, that at rest if full inflation was scanned and
  * full inflation if rest was scanned, unless metadata "resting_spread" gives it: 0.08 / 0.48, the

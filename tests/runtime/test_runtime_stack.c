@@ -7,6 +7,7 @@
 
 #include <supine/breath.h>
 #include <supine/compare.h>
+#include <supine/doubt.h>
 #include <supine/locate.h>
 #include <supine/posture.h>
 #include <supine/runtime.h>
@@ -19,6 +20,7 @@ enum {
   VERTICES = 1200,
   SEEN = SUPINE_LOCATE_POINTS_MAX,
   SLABS = 8,
+  COVARIED = 40,
   STATED = 128 << 10, /* stack that the header states, bytes */
   BELOW = 1 << 20,    /* memory below the stack, where a deeper stack would show, bytes */
   PAINT = 0xA5
@@ -44,7 +46,9 @@ typedef struct work {
   supine_expected_part parts[SUPINE_EXPECTED_TERMS];
   supine_observation seen[SEEN];
   supine_locate_residual residuals[SEEN];
-  double *space;
+  double *space, *doubt_space, *mend_space;
+  supine_doubt_point points[COVARIED];
+  double covariance[9 * COVARIED * COVARIED];
   char text[160];
 } work;
 
@@ -123,6 +127,17 @@ static void use_location(work *w) {
       .inside = w->basis, .count = SEEN, .observed = w->seen, .state = w->state, .rigid = true};
   expect_ok(supine_locate(&task, w->residuals, w->space, &found, &w->error));
   expect_ok(supine_locate_positions(found, w->basis, w->xyz, w->distance, &w->error));
+  const supine_doubt_task field = {.basis = w->basis, .state_count = 1, .location = found};
+  const supine_doubt *doubt = NULL;
+  const supine_doubt_mend *mend = NULL;
+  expect_ok(supine_doubt_prepare(&field, w->doubt_space, &doubt, &w->error));
+  expect_ok(supine_doubt_sample(doubt, 0, 1, 2, w->xyz, &w->error));
+  expect_ok(supine_doubt_mend_prepare(doubt, 0, w->mend_space, &mend, &w->error));
+  expect_ok(supine_doubt_mend_sample(mend, w->xyz, &w->error));
+  for (size_t i = 0; i < COVARIED; ++i) {
+    w->points[i].vertex = i * VERTICES / COVARIED;
+  }
+  expect_ok(supine_doubt_covariance(doubt, COVARIED, w->points, NULL, w->covariance, &w->error));
 }
 
 static void use_all(work *w) {
@@ -156,6 +171,8 @@ static void expect_small_stack(fixture *f, void (*use)(work *w)) {
   pthread_t thread;
   w->bytes = fixture_bytes(f, &w->size);
   w->space = fixture_allocate(supine_locate_space(SEEN), sizeof *w->space);
+  w->doubt_space = fixture_allocate(1 << 16, sizeof *w->doubt_space);
+  w->mend_space = fixture_allocate(1 << 20, sizeof *w->mend_space);
   w->use = use;
   unsigned char *memory =
       mmap(NULL, BELOW + STATED, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -174,6 +191,8 @@ static void expect_small_stack(fixture *f, void (*use)(work *w)) {
   assert_in_range(used, 1 << 10, STATED);
   (void)pthread_attr_destroy(&attributes);
   (void)munmap(memory, BELOW + STATED);
+  free(w->doubt_space);
+  free(w->mend_space);
   free(w->space);
   free(w->bytes);
   free(w);
