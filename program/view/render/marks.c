@@ -178,7 +178,7 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
                          box[1] > m->box[3] + gap || m->box[1] > box[3] + gap;
       double other[2];
       nearest_of(m->box, m->at, other);
-      cost += apart ? 0.0 : 4.0;
+      cost += apart ? 0.0 : 16.0;
       cost += crosses(s->mark[own].at, end, m->box) ? 2.0 : 0.0;
       cost += crosses(m->at, other, box) ? 2.0 : 0.0;
       cost += lines_cross(s->mark[own].at, end, m->at, other) ? 2.0 : 0.0;
@@ -197,7 +197,7 @@ static double width_of(const sketch *s, const shown *m) {
 /* Place the name of a mark where it hides least, near its mark and rather beside it; on its mark,
  * if that is a large structure. */
 static void place(const sketch *s, size_t own) {
-  enum { WAYS = 16, STEPS = 7 };
+  enum { WAYS = 16, STEPS = 10 };
   shown *m = &s->mark[own];
   const double font = s->style->font;
   const double edge = 0.3 * font; /* space beside names at the edges of the picture */
@@ -258,8 +258,8 @@ static void name(const sketch *s, const shown *m) {
   }
 }
 
-/* Project the marks, and fill s->mark [count] with those that have a label, those of large
- * structures last, and s->ball [ball_count]. */
+/* Project the marks, and fill s->mark [count] with those that have a label, the selected one first
+ * and those of large structures last, and s->ball [ball_count]. */
 static void project(sketch *s, const supine_basis *basis, const supine_scene *scene,
                     double (*pixel)[3]) {
   const supine_marks *all = scene->content;
@@ -286,6 +286,13 @@ static void project(sketch *s, const supine_basis *basis, const supine_scene *sc
                   .radius = radius,
                   .ring = ringed ? (double)(mark->reach + mark->expected) * pixel[i][2] : 0.0,
                   .arrow = mark->moved && moved > radius && mark->kind != SUPINE_MARK_ANATOMY};
+    }
+  }
+  for (size_t i = 0; i < s->count; ++i) {
+    if (s->mark[i].mark->kind == SUPINE_MARK_SELECTED) {
+      const shown selected = s->mark[i];
+      s->mark[i] = s->mark[0];
+      s->mark[0] = selected;
     }
   }
 }
