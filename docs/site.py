@@ -27,6 +27,10 @@ import devices
 source, demo, site = sys.argv[1:4]
 OTHERS = ["model", "accuracy", "paper", "trust", "inputs", "compare", "promises", "devices", "platforms"]
 
+# The live page stands in the first page where there is room for it, and is one touch away on a phone.
+LIVE = ('<a class="live" href="live.html">Turn the lungs yourself</a>',
+        '<iframe src="live.html" loading="lazy" title="Lungs that turn: choose a posture"></iframe>')
+
 STYLE = """
 :root { color-scheme: light dark;
   --ink: #121d2b; --soft: #4b596b; --line: #d5dce6; --ground: #fff; --code: #f1f4f8; --link: #0e6370; }
@@ -62,10 +66,12 @@ th, td { padding: 6px 12px 6px 0; border-bottom: 1px solid var(--line); text-ali
 #found li { margin: 8px 0; }
 #found small { display: block; padding: 0 8px; color: var(--soft); }
 summary { padding: 6px 0; font-weight: 600; cursor: pointer; }
-.live a { display: inline-block; padding: 8px 16px; border-radius: 8px; background: var(--link); color: var(--ground);
+.live { display: inline-block; padding: 8px 16px; border-radius: 8px; background: var(--link); color: var(--ground);
   font-weight: 600; text-decoration: none; }
-@media (min-width: 821px) { summary { display: none; } }
+iframe { width: 100%; height: 640px; border: 1px solid var(--line); border-radius: 8px; }
+@media (min-width: 821px) { summary, .live, iframe + picture { display: none; } }
 @media (max-width: 820px) {
+  iframe { display: none; } /* which does not load then */
   #page { display: block; padding: 16px; }
   nav { position: static; max-height: none; margin-bottom: 24px; border-bottom: 1px solid var(--line); }
 }
@@ -148,8 +154,8 @@ class Page:
                             for at, title in entries)
             menu += f"<strong>{heading}</strong><ul>{links}</ul>"
         title = self.title if self.title == "Supine" else f"{self.title} - Supine"
-        live = f'<p class="live"><a href="{self.relative("live.html")}">Turn the lungs yourself</a></p>'
-        body = re.sub("</h1>", lambda _: "</h1>\n" + live, self.body, count=1) if self.title == "Supine" else self.body
+        body = self.body.replace("</h1>", f"</h1>\n{LIVE[0]}", 1).replace("<picture>", f"{LIVE[1]}<picture>", 1) \
+            if self.title == "Supine" else self.body
         root = posixpath.relpath(".", posixpath.dirname(self.address) or ".")
         page = (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
                 f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'

@@ -43,8 +43,6 @@ function drawNotes() {
     }
   }
   if (below) {
-    const [right, top] = [width - below[0], below[1]];
-    notes.taken.push([right - 265, top, right, top + 26]); // the switches under the lens
     changed('day', ringOf(between[state.chosen], state.day).day, (day) => {
       for (const input of document.getElementsByName('day')) input.checked = DAYS[input.value] === day;
     });

@@ -73,6 +73,7 @@ function drawTrace(context, was, at, radius, ring, seen = at) {
 }
 
 const LENS_WIDE = 720; // width of a picture in which the lens has its words beside it, units of notes
+const SWITCHES = [290, 30]; // width and height of the switches under the lens, units of notes
 
 /** The canvas with the notes. `taken` has the boxes [left, top, right, bottom] that names may not cover. */
 class Notes {
@@ -202,7 +203,9 @@ class Notes {
     const inLens = (p) => p.map((x, k) => middle[k] + ((x - centre[k]) / scale) * grown);
     drawTrace(context, inLens(was), inLens(at), radius * grown, error * grown, inLens(seen));
     context.restore();
-    taken.push([middle[0] - size, 0, width, middle[1] + size + (narrow ? 68 : 36)]);
+    const below = narrow ? [10, middle[1] + size + 38] : [width - middle[0] - size, middle[1] + size + 6];
+    taken.push([middle[0] - size, 0, width, below[1]]);
+    taken.push([width - below[0] - SWITCHES[0], below[1], width, below[1] + SWITCHES[1]]);
     if (narrow) {
       this.text(shortName(target.name), width - 10, middle[1] + size + 12, {
         align: 'right',
@@ -210,7 +213,7 @@ class Notes {
         font: '600 12px',
       });
       this.text(`${target.mm.toFixed(1)} mm`, width - 10, middle[1] + size + 28, { align: 'right', font: '600 12px' });
-      return ring.error === null ? null : [10, middle[1] + size + 38];
+      return ring.error === null ? null : below;
     }
     const ways = isTold(target) ? wayWords(target.move, 3, pane.gravity).split(', ') : [withinWords(target.error)];
     const lines = [
@@ -224,7 +227,7 @@ class Notes {
     lines.forEach(([words, colour, font], i) =>
       this.text(words, middle[0] + size + 12, middle[1] - size + 18 + 18 * i, { colour, font }),
     );
-    return ring.error === null ? null : [width - middle[0] - size, middle[1] + size + 6];
+    return ring.error === null ? null : below;
   }
 }
 
