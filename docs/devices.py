@@ -101,9 +101,9 @@ def page(folder):
              "[Limits](guide/limits.md) has the measurements.", ""]
     lines += [f"- **{name}.** {plain(text)}" for name, text in sources.limits()]
     lines += ["", "### Mistakes in inputs that are taken without a word", "",
-              "`tests/doors.py` gives each input every kind of mistake. All are told or refused, but for these:", "",
-             
-              "| input | mistake |", "|---|---|"]
+              "`tests/doors.py` gives each input every kind of mistake. "
+              + ("All are told or refused, but for these:" if sources.taken() else "All are told or refused.")]
+    lines += ["", "| input | mistake |", "|---|---|"] if sources.taken() else []
     lines += [f"| `{door}` | {mistake} |" for door, mistake in sources.taken()]
     lines += ["", "### Limits of inputs that are assumed", "",
               "No measurement supports these limits of [inputs](inputs.md), or a part of them.", "",

@@ -450,9 +450,7 @@ ROWS = {("scan", "person"): "one-person", ("scan", "swapped"): "rest-most",
         ("breath", "range"): "breath", ("pose", "repeated"): "tracker-invalid"}
 
 # Mistakes that are taken today, or get different verdicts: door, kind, and the topic of the work that will mend them.
-KNOWN = {
-    ("command deform --labels SEGMENTATION", "person"): "belongs",
-}
+KNOWN = {}
 
 
 # Mistakes in texts that different doors judge differently, and the topic of the work that will mend them.

@@ -18,11 +18,12 @@ static const double rim = 3.0;
 static const double label_rim = 15.0;
 /* If the labels of a map fill this share of the lungs, it shows the lungs, but not all of these.
  * Its labels are then judged together, and may lie outside by less, mm. */
-static const double shown_least = 0.6;
+static const double shown_least = 0.4;
 static const double shown_most = 0.96;
 static const double lung_rim = 10.0;
-/* A label of which less than this share lies in the lungs does not belong to them. */
-static const double label_inside = 1.0 / 3.0;
+/* A label of which less than this share lies in the lungs, not counting what lies between them,
+ * does not belong to them. */
+static const double label_inside = 0.2;
 /* Collapsed and consolidated tissue, and that outside the lungs, is above this density, HU. */
 static const double airless = -300.0;
 enum { LABELS = 65536 };
@@ -117,7 +118,7 @@ static supine_input_verdict describe(const sight *s, bool ct, bool scaled, char 
 /* What is found of a label. */
 typedef struct labelled {
   supine_lungs_belong far, near; /* its voxels, with the wide and the narrow rim */
-  size_t inside;                 /* number of voxels inside the lungs */
+  size_t inside, beside;         /* numbers of voxels inside the lungs, and outside */
 } labelled;
 
 /* Warn of labels that lie in the lungs mostly, but far outside in part, as another person's do. A
@@ -129,7 +130,8 @@ static void judge_labels(const labelled *found, const sight *s, const char *path
   char text[320];
   for (size_t label = 1; label < LABELS; ++label) {
     const supine_lungs_belong *near = &found[label].near;
-    if ((double)found[label].inside > label_inside * (double)near->count) {
+    const double placed = (double)(found[label].inside + found[label].beside);
+    if ((double)found[label].inside > label_inside * placed) {
       (void)snprintf(text, sizeof text, "voxels of label %zu in %.256s", label, path);
       taken = supine_lungs_belong_judge(&found[label].far, SUPINE_INPUT_CONTENT_OUTSIDE, text,
                                         "basis", findings) == SUPINE_INPUT_TAKEN &&
@@ -168,16 +170,17 @@ static supine_status check_labels(const supine_field *field, const supine_image 
       continue;
     }
     supine_image_place(image, i, point);
+    labelled *here = &found[(size_t)label];
     if (!supine_lungs_is_between(s->low, s->high, 0, point)) {
       supine_warp_find_cell(&field->depth, point, &cell);
       supine_warp_interpolate(&field->depth, &cell, &depth, NULL);
+      here->inside += depth >= 0.0;
+      here->beside += depth < 0.0;
     }
-    labelled *here = &found[(size_t)label];
     here->far.rim = label_rim;
     here->near.rim = lung_rim;
     supine_lungs_belong_add(&here->far, depth);
     supine_lungs_belong_add(&here->near, depth);
-    here->inside += depth >= 0.0;
   }
   judge_labels(found, s, path, findings);
   return SUPINE_OK;

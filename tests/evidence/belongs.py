@@ -10,10 +10,10 @@ are label maps of the lobes of further people. Prints, for docs/inputs.md, the s
 others' lungs and lobes that lie more than 5 mm and an edge outside the surface of a basis and not between the lungs;
 how far the backs of two lungs are apart; the share of the lungs that is no lung, hence without air, in the own CT,
 in the same 12 and 30 mm off, in the exhaled one, and in others'; the half ball on the section of a lung at the border
-of an image that shows all but a share of it; and how many different values label maps have, and
-the slices of CT, MR and scintigraphy that pydicom brings. Each line states the people, the measurements n, and the
-range of the largest and of the smallest value if each person is left out in turn. Needs nibabel and pydicom; exit code
-77: no data."""
+of an image that shows all but a share of it; how often labels that are moved are told of; and how many different
+values label maps have, and the slices of CT, MR and scintigraphy that pydicom brings. Each line states the people,
+the measurements n, and the range of the largest and of the smallest value if each person is left out in turn.
+Needs nibabel and pydicom; exit code 77: no data."""
 import glob
 import itertools
 import os
@@ -111,6 +111,42 @@ def images(copd, people):
          [((i, j), airless(full[i], full[j])) for i, j in itertools.permutations(range(len(people)), 2)])
 
 
+def label_maps(mask, affine):
+    """Return the matrix of maps with room around the lungs, a map of each lung alone, and one of both with the wall of
+    the chest (2) and an organ below the right lung and the midline (3). The third axis leads to the head."""
+    from scipy.ndimage import distance_transform_edt
+    lungs, frame = np.pad(mask, 30), affine.copy()
+    frame[:3, 3] -= affine[:3, :3] @ [30, 30, 30]
+    columns = lungs.sum((1, 2))
+    third = len(columns) // 3
+    middle = third + np.argmin(columns[third:2 * third])
+    alone = [np.where((np.arange(len(columns)) < middle)[:, None, None] == side, lungs, 0) for side in (True, False)]
+    right = slice(0, middle + 8) if affine[0, 0] < 0 else slice(middle - 8, None)  # x leads to the right in RAS
+    beside = np.where(distance_transform_edt(~lungs, sampling=abs(np.diag(affine)[:3])) < 14, 2, 0)
+    beside[right][lungs.any(2)[right][:, :, None] & (lungs[right].cumsum(2) == 0)] = 3
+    return frame, *alone, np.where(lungs, 1, beside)
+
+
+def labels(supine, maps):
+    """Show how often labels that are moved with a basis of contents() are told of."""
+    def told(voxels, frame):
+        nibabel.save(nibabel.Nifti1Image(voxels.astype(np.uint8), frame), "labels.nii.gz")
+        done = subprocess.run([supine, "deform", "grid.st", "--posture", "prone", "--labels", "labels.nii.gz",
+                               "--allow-folds", "-o", "moved.nii.gz"], check=True, capture_output=True, text=True)
+        return "lie outside" in done.stderr or "lie in the image" in done.stderr
+    masks = [read_mask(path) for path, *_ in maps]
+    made = [label_maps(*mask) for mask in masks]
+    found = {"own lungs": [], "one lung alone": [], "own lungs, wall and organ": [], "lungs of others": []}
+    for edge, (i, (frame, *alone, organs)) in itertools.product((6, 12), enumerate(made)):
+        run(supine, "embed", f"{edge}_{i}.st", "--grid", 10, "-o", "grid.st")
+        found["own lungs"].append(told(*masks[i]))
+        found["one lung alone"] += [told(lung, frame) for lung in alone]
+        found["own lungs, wall and organ"].append(told(organs, frame))
+        found["lungs of others"] += [told(*mask) for j, mask in enumerate(masks) if j != i]
+    for title, each in found.items():
+        print(f"moved labels, {title}: {sum(each)} of {len(each)} told", flush=True)
+
+
 def cuts(copd, people):
     """Show the half ball at the border of an image that shows all of a lung but a share at the head or the feet."""
     found = {lost: [] for lost in (0.0005, 0.005)}
@@ -145,8 +181,10 @@ def main(build, copd, *lobes):
         sys.exit(77)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        contents(supine, [(f"{copd}/{p}_insp.nii.gz", "1", ()) for p in people] +
-                 [(path, "all", ("--labels", "lobes")) for path in lobes])
+        maps = [(f"{copd}/{p}_insp.nii.gz", "1", ()) for p in people]
+        maps += [(path, "all", ("--labels", "lobes")) for path in lobes]
+        contents(supine, maps)
+        labels(supine, maps)
         images(copd, people)
         cuts(copd, people)
     values([*glob.glob(copd + "/*.nii.gz"), *lobes])
