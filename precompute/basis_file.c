@@ -291,7 +291,7 @@ static void add_all(entries *list, const supine_prepared *prepared,
   add(list, "made_by", "%s", choice->made_by != NULL ? choice->made_by : "supine_precompute");
 }
 
-enum { TENSORS_MAX = 27 };
+enum { TENSORS_MAX = 28 };
 
 /* Return the tensor of the coefficients, without data if they follow from clusters. */
 static supine_tensor list_coefficients(const supine_computed *computed,
@@ -319,7 +319,7 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
   const size_t k = field->mode_count;
   const size_t g = lungs->lung_count;
   const size_t q = made->normals.count;
-  const supine_clusters *clusters = &computed->clusters;
+  const supine_clusters *c = &computed->clusters;
   const supine_simulated_volumes *s = &made->simulated;
   const bool simulated = field->order > 0;
   const supine_tensor all[TENSORS_MAX] = {
@@ -328,13 +328,9 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"modes", SUPINE_F64, 3, {k, supine_sh_count(field->band), field->order + 1}, field->modes},
       {"lung", SUPINE_U8, 1, {n}, made->lung},
       list_coefficients(computed, made),
-      {"clusters", SUPINE_U16, 1, {n}, clusters->cluster},
-      {"cluster_scalars", SUPINE_I16, 2, {n, 2}, clusters->scalars},
-      {"cluster_vectors",
-       SUPINE_F32,
-       3,
-       {clusters->count, k, SUPINE_CLUSTER_NUMBERS},
-       clusters->vectors},
+      {"clusters", SUPINE_U16, 1, {n}, c->cluster},
+      {"cluster_scalars", SUPINE_I16, 2, {n, 2}, c->scalars},
+      {"cluster_vectors", SUPINE_F32, 3, {c->count, k, SUPINE_CLUSTER_NUMBERS}, c->vectors},
       {"simulated_range", SUPINE_F64, 2, {g, 2}, simulated ? computed->fit.range : NULL},
       {"simulated_limits", SUPINE_F64, 3, {g, 2, s->limit_terms}, simulated ? s->limits : NULL},
       {"simulated_shares", SUPINE_F64, 3, {g, 9, s->share_count}, simulated ? made->shares : NULL},
@@ -350,6 +346,7 @@ static size_t list_tensors(const supine_computed *computed, const supine_stored 
       {"error_modes", SUPINE_F64, 1, {modes}, modes > 0 ? table->modes : NULL},
       {"error_vertices", SUPINE_F32, 1, {n}, e->vertices},
       {"error_gravity", SUPINE_F64, 2, {e->rows, e->terms}, e->harmonics},
+      {"error_volume", SUPINE_F64, 1, {e->volume_count}, e->by_volume},
       {"error_share", SUPINE_F32, 1, {n}, computed->error_share},
       {"landmarks", SUPINE_F32, 2, {computed->landmark_count, 4}, computed->landmarks},
       {"normals", SUPINE_I8, 3, {n, 3, q + 1}, made->normals.modes},

@@ -95,6 +95,10 @@ supine_status supine_precompute_from_fields(const supine_prepared *prepared,
   errors->vertices = supine_arena_take(&computed->memory, n, sizeof(float));
   errors->harmonics =
       supine_arena_zeros(&computed->memory, errors->rows * errors->terms, sizeof(double));
+  if (computed->fit.report.order > 0) {
+    errors->volume_count = computed->fit.report.volume_count;
+    errors->by_volume = supine_arena_zeros(&computed->memory, errors->volume_count, sizeof(double));
+  }
   SUPINE_TRY(supine_arena_check(&computed->memory, error, "%zu vertices", n));
   return supine_fields_measure(&computed->fit, choice->modes == 0 ? 0 : compression->mode_count,
                                &computed->accuracy, errors, error);

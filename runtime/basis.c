@@ -569,6 +569,24 @@ static supine_status check_landmarks(const check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+/* Check the optional tensor 'error_volume' of another simulator's fields over volume. */
+static supine_status check_volume_errors(const check *c, supine_basis *basis) {
+  size_t count = ANY;
+  if (basis->info.order == 0 || supine_safetensors_find(c->file, "error_volume") == NULL) {
+    return SUPINE_OK;
+  }
+  REQUIRE(basis->error_volume, c, "error_volume", SUPINE_F64, 1, &count);
+  double least = count < 2 ? -1 : 0;
+  for (size_t i = 0; i < count; ++i) {
+    least = fmin(least, basis->error_volume[i]);
+  }
+  if (least < 0) {
+    return refuse(c, "tensor 'error_volume' has less than two numbers, or one below 0");
+  }
+  basis->error_volume_count = count;
+  return SUPINE_OK;
+}
+
 /* Check the optional tensors 'error_vertices' and 'error_gravity' of another simulator's fields. */
 static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
   size_t n = basis->info.vertex_count;
@@ -591,7 +609,7 @@ static supine_status check_vertex_errors(const check *c, supine_basis *basis) {
     return refuse(c, "tensor 'error_gravity' belongs to band %zu, above %d", band, FIT_BAND_MAX);
   }
   REQUIRE(basis->error_gravity, c, "error_gravity", SUPINE_F64, 2, shape);
-  return SUPINE_OK;
+  return check_volume_errors(c, basis);
 }
 
 /* Check the optional metadata with the constants of expected errors (expected.c). */

@@ -499,7 +499,8 @@ static bool is_same(const supine_basis *basis, const supine_pose *a, const supin
   return apart == 0;
 }
 
-double supine_expected_along(size_t band, const double *harmonics, const double gravity[3]) {
+double supine_expected_along(size_t band, const double *harmonics, const double gravity[3],
+                             double factor) {
   double y[(FIT_BAND_MAX + 2) * (FIT_BAND_MAX + 2)];
   const size_t count = supine_sh_count(band + 1);
   double square = 0;
@@ -512,9 +513,36 @@ double supine_expected_along(size_t band, const double *harmonics, const double 
     for (size_t t = 0; t < count; ++t) {
       part += harmonics[row * count + t] * y[t];
     }
-    square += part * part;
+    square += (row == 0 ? 1 : factor) * part * part;
   }
   return sqrt(square);
+}
+
+/* Return the factor, at the volume of a pose, of the part of the squared error that depends on the
+ * direction of gravity: by linear interpolation between those of the file. */
+static double factor_at(const supine_basis *basis, const supine_pose *pose) {
+  const double *range = basis->simulated.total;
+  const double *factor = basis->error_volume;
+  const double last = (double)basis->error_volume_count - 1;
+  double volumes[SUPINE_LUNGS_MAX];
+  double total = -supine_expected_reference(basis);
+  if (factor == NULL) {
+    return 1;
+  }
+  (void)supine_basis_volumes(basis, pose, volumes);
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    total += volumes[lung];
+  }
+  const double at = fmin(fmax((total - range[0]) / (range[1] - range[0]), 0), 1) * last;
+  const size_t low = (size_t)fmin(at, last - 1);
+  return factor[low] + (at - (double)low) * (factor[low + 1] - factor[low]);
+}
+
+/* Return the error of a fit to another simulator's fields in a state / that over all runs. */
+static double relative_error(const supine_basis *basis, const double gravity[3],
+                             const supine_pose *pose) {
+  return supine_expected_along(basis->info.band, basis->error_gravity, gravity,
+                               factor_at(basis, pose));
 }
 
 /* Write the errors of a fit to another simulator's fields. The errors of two states are taken as
@@ -526,12 +554,11 @@ static supine_status evaluate_fields(const supine_basis *basis, const supine_sta
   if (basis->vertex_error == NULL) {
     return refuse_fields(basis, error);
   }
-  const size_t band = basis->info.band;
-  double factor = supine_expected_along(band, basis->error_gravity, state->gravity);
+  double factor = relative_error(basis, state->gravity, pose);
   if (from != NULL && !supine_basis_is_scan(basis, from)) {
     supine_pose other;
     SUPINE_TRY(supine_basis_pose(basis, from, &other, error));
-    const double before = supine_expected_along(band, basis->error_gravity, from->gravity);
+    const double before = relative_error(basis, from->gravity, &other);
     factor = is_same(basis, pose, &other) ? 0 : hypot(factor, before);
   }
   for (size_t i = 0; i < basis->info.vertex_count; ++i) {

@@ -46,8 +46,11 @@ supine_status supine_expected_fit_landmarks(const supine_basis *basis, supine_kr
 /** Return the error of a fit to another simulator's fields in a direction of gravity, divided by
  * its RMS over all directions: |E y|.
  * @param band       L, that of the fit, at most FIT_BAND_MAX
- * @param harmonics  E [2 L + 4, (L + 2)^2], or NULL if it is unknown: the factor is 1 */
-double supine_expected_along(size_t band, const double *harmonics, const double gravity[3]);
+ * @param harmonics  E [2 L + 4, (L + 2)^2], or NULL if it is unknown: the result is 1
+ * @param factor     of the squares of all rows of E but the first, whose harmonic is constant; 1 in
+ *   the mean over the runs */
+double supine_expected_along(size_t band, const double *harmonics, const double gravity[3],
+                             double factor);
 
 /** Limits of the 95 % interval of SUPINE_EXPECTED_ERROR_MM, mm. */
 #define EXPECTED_ERROR_LOW 3.7

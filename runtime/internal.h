@@ -97,6 +97,11 @@ struct supine_basis {
   /** [2 L + 4, (L + 2)^2] harmonics E of the direction of gravity: there, the error is |E y| times
    * that; NULL if the file has none */
   const double *error_gravity;
+  /** [error_volume_count] factors of the part of its square that depends on the direction of
+   * gravity, at evenly spaced total volumes from the smallest to the largest simulated; the number
+   * is 0 if the file has none */
+  const double *error_volume;
+  size_t error_volume_count;
   /** [vertices] variance that a fit's landmarks leave, divided by its mean at points that were held
    * out; NULL if the file has none */
   const float *error_share;

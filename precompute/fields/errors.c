@@ -11,7 +11,11 @@
  * where x_i are the directions of the runs and A is the pseudo-inverse of their matrix. The squared
  * error in d is the squared error in directions left out, times sum_m e_m(d)^2, divided by the same
  * sum for directions left out. The error between the volumes follows likewise from that in volumes
- * left out, with the Chebyshev polynomial above the order in place of the harmonics. */
+ * left out, with the Chebyshev polynomial above the order in place of the harmonics.
+ *
+ * How much a fit misses in gaps between the directions also depends on the volume: in CalculiX,
+ * most at the smallest. The squared errors in directions left out are therefore compared by volume.
+ */
 #include <cblas.h>
 #include <math.h>
 #include <string.h>
@@ -19,7 +23,7 @@
 #include <supine/sh.h>
 
 #include "base/vec3.h"
-#include "precompute/fields/fields.h"
+#include "precompute/fields/volumes.h"
 #include "precompute/projection/tally.h"
 #include "runtime/expected.h"
 
@@ -35,6 +39,7 @@ typedef struct left_errors {
   supine_run_groups groups;
   size_t run_count;    /* number of runs in the groups */
   double *square;      /* [vertices] sum over the runs of the squared error, mm^2 */
+  double *run;         /* [runs] sum over the vertices of the squared error, with all modes, mm^2 */
   double total, exact; /* sum over the vertices: with the modes of the basis, and with all */
 } left_errors;
 
@@ -74,7 +79,10 @@ static supine_status leave_out(const left_work *w, left_errors *made, supine_err
     const size_t count = groups->begin[group + 1] - groups->begin[group];
     supine_status status = supine_fields_regression_predict(&fit->chosen, groups, group, fit->gram,
                                                             0, w->residual, w->sums);
-    made->exact += cblas_dasum((int)count, w->sums, 1);
+    for (size_t i = 0; i < count; ++i) {
+      made->run[groups->run[groups->begin[group] + i]] = w->sums[i];
+      made->exact += w->sums[i];
+    }
     if (status == SUPINE_OK && w->modes > 0) {
       status = supine_fields_regression_predict(&fit->chosen, groups, group, fit->gram, w->modes,
                                                 w->residual, w->sums);
@@ -188,6 +196,36 @@ static supine_status find_volume_ratio(const supine_fit *fit, const supine_run_g
   return SUPINE_OK;
 }
 
+/* Find how the squared error in directions left out depends on the total volume: its mean over the
+ * runs near each of `count` volumes, weighted as linear interpolation between these volumes weights
+ * them, divided by that of all runs; 1 where no run is near.
+ * @param square  [runs]
+ * @param factor  [count] zeros; written */
+static supine_status find_volume_factors(const supine_fit *fit, const double *square, size_t count,
+                                         double *factor) {
+  const size_t m = fit->fields->run_count;
+  const double mean = cblas_dasum((int)m, square, 1) / (double)m;
+  double range[2];
+  SUPINE_ARENA arena = {0};
+  double *total = supine_arena_take(&arena, m, sizeof *total);
+  double *weight = supine_arena_zeros(&arena, count, sizeof *weight);
+  SUPINE_TRY(supine_arena_status(&arena));
+  supine_fields_map_totals(fit, total, range);
+  for (size_t run = 0; run < m; ++run) {
+    const double at = 0.5 * (total[run] + 1.0) * (double)(count - 1);
+    const size_t low = (size_t)fmin(at, (double)(count - 2));
+    const double part[2] = {1.0 - (at - (double)low), at - (double)low};
+    for (size_t k = 0; k < 2; ++k) {
+      factor[low + k] += part[k] * square[run];
+      weight[low + k] += part[k];
+    }
+  }
+  for (size_t k = 0; k < count; ++k) {
+    factor[k] = weight[k] * mean > 0.0 ? factor[k] / (weight[k] * mean) : 1.0;
+  }
+  return SUPINE_OK;
+}
+
 /* Combine the errors in directions and in volumes left out to those of states between the runs. */
 static supine_status combine(const supine_fit *fit, const left_errors *directions,
                              const left_errors *volumes, supine_fit_errors *made) {
@@ -199,6 +237,9 @@ static supine_status combine(const supine_fit *fit, const left_errors *direction
   double ratio = 0.0;
   double gravity = 0.0;
   SUPINE_TRY(find_missed_harmonics(fit, made->harmonics + made->terms, &square, &ratio));
+  if (made->volume_count > 0) {
+    SUPINE_TRY(find_volume_factors(fit, directions->run, made->volume_count, made->by_volume));
+  }
   for (size_t lung = 0; lung < fit->lungs->lung_count; ++lung) {
     double volume_ratio = 0.0;
     if (volumes->run_count > 0) {
@@ -227,10 +268,12 @@ supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_
   const size_t inner = fit->groups.count - fit->direction_groups;
   SUPINE_ARENA arena = {0};
   left_errors directions = {.groups = {fit->direction_groups, fit->groups.begin, fit->groups.run},
-                            .square = supine_arena_zeros(&arena, n, sizeof(double))};
+                            .square = supine_arena_zeros(&arena, n, sizeof(double)),
+                            .run = supine_arena_zeros(&arena, m, sizeof(double))};
   left_errors volumes = {
       .groups = {inner, fit->groups.begin + fit->direction_groups, fit->groups.run},
-      .square = supine_arena_zeros(&arena, n, sizeof(double))};
+      .square = supine_arena_zeros(&arena, n, sizeof(double)),
+      .run = supine_arena_zeros(&arena, m, sizeof(double))};
   const left_work work = {
       .fit = fit,
       .modes = modes,
@@ -264,6 +307,10 @@ void supine_fields_complete_errors(size_t vertex_count, supine_fit_errors *error
   enum { DIRECTIONS = 2000 };
   double square = 0.0;
   double largest = 0.0;
+  double factor = errors->volume_count > 0 ? 0.0 : 1.0;
+  for (size_t k = 0; k < errors->volume_count; ++k) {
+    factor = fmax(factor, errors->by_volume[k]);
+  }
   for (size_t i = 0; i < vertex_count; ++i) {
     square += (double)errors->vertices[i] * (double)errors->vertices[i] / (double)vertex_count;
   }
@@ -274,7 +321,8 @@ void supine_fields_complete_errors(size_t vertex_count, supine_fit_errors *error
   for (size_t d = 0; d < DIRECTIONS; ++d) {
     double g[3];
     supine_spiral((double)d, DIRECTIONS, 0.5, g);
-    largest = fmax(largest, supine_expected_along(errors->rows / 2 - 2, errors->harmonics, g));
+    largest =
+        fmax(largest, supine_expected_along(errors->rows / 2 - 2, errors->harmonics, g, factor));
   }
   errors->between_mm = sqrt(square);
   errors->gap_mm = largest * errors->between_mm;

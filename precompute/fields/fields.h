@@ -138,16 +138,20 @@ typedef struct supine_fit_errors {
    * direction g is |E y(g)| times that in `vertices`; the mean of |E y|^2 over all directions is 1
    */
   double *harmonics;
+  size_t volume_count; /**< 0 if the fit does not depend on volume */
+  /** [volume_count] at evenly spaced total volumes, from the smallest to the largest simulated: the
+   * part of the squared error that depends on the direction of gravity / its mean over all runs */
+  double *by_volume;
   double between_mm; /**< RMS of `vertices` */
-  double gap_mm;     /**< that in the direction of gravity where it is largest, in a gap between the
-                          directions of the runs */
+  double gap_mm;     /**< that in the direction of gravity and at the volume where it is largest, in
+                          a gap between the directions of the runs */
 } supine_fit_errors;
 
 /** Measure the errors of a basis of the fit: each run predicted from the others, in mm and relative
  * to the RMS displacement. The member `volume` is 0, as nothing is scaled to a volume. Derive the
  * errors of states between the runs.
  * @param modes   number of modes of the basis, or 0 if it has the harmonics themselves
- * @param errors  its members `vertices` and `gravity_part` are written;
+ * @param errors  its members `vertices`, `gravity_part` and `by_volume` are written;
  * supine_fields_complete_errors completes `harmonics` */
 supine_status supine_fields_measure(const supine_fit *fit, size_t modes, supine_accuracy *accuracy,
                                     supine_fit_errors *errors, supine_error *error);

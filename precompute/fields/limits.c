@@ -7,7 +7,7 @@
 #include <supine/sh.h>
 
 #include "base/lapack.h"
-#include "precompute/fields/fields.h"
+#include "precompute/fields/volumes.h"
 
 /* Highest band of the shares of the lungs. */
 enum { SHARE_BAND = 2 };
@@ -121,20 +121,10 @@ static supine_status fit_shares(const supine_fit *fit, supine_simulated_volumes 
   const size_t order = fit->report.order;
   const size_t terms = supine_sh_terms(share_band(fit), order);
   SUPINE_ARENA arena = {0};
-  double *total = supine_arena_zeros(&arena, m, sizeof *total);
+  double *total = supine_arena_take(&arena, m, sizeof *total);
   supine_regression fitted;
   SUPINE_TRY(supine_arena_status(&arena));
-  for (size_t i = 0; i < m * fit->lungs->lung_count; ++i) {
-    total[i % m] += fit->volume[i];
-  }
-  made->total[0] = made->total[1] = total[0];
-  for (size_t run = 0; run < m; ++run) {
-    made->total[0] = fmin(made->total[0], total[run]);
-    made->total[1] = fmax(made->total[1], total[run]);
-  }
-  for (size_t run = 0; run < m; ++run) {
-    total[run] = 2.0 * (total[run] - made->total[0]) / (made->total[1] - made->total[0]) - 1.0;
-  }
+  supine_fields_map_totals(fit, total, made->total);
   const supine_runs runs = {
       .count = m, .part_count = 1, .gravity = fit->fields->directions, .volume = total};
   SUPINE_TRY(supine_fields_regression_create(&runs, share_band(fit), order, &arena, &fitted));

@@ -2,6 +2,7 @@
 /* Measure the volumes of the lungs in the runs of a simulator, and group the runs. */
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <supine/inputs.h>
 
@@ -108,21 +109,27 @@ static supine_status check_repeated(const supine_fit *fit, const size_t *directi
   return SUPINE_OK;
 }
 
-/* Map the volumes of each lung to -1 to 1. */
-static void map_volumes(supine_fit *fit) {
-  const size_t m = fit->fields->run_count;
-  for (size_t lung = 0; lung < fit->lungs->lung_count; ++lung) {
-    const double *volume = fit->volume + lung * m;
-    double *range = fit->range[lung];
-    range[0] = range[1] = volume[0];
-    for (size_t run = 0; run < m; ++run) {
-      range[0] = fmin(range[0], volume[run]);
-      range[1] = fmax(range[1], volume[run]);
-    }
-    for (size_t run = 0; run < m; ++run) {
-      fit->parameter[lung * m + run] = 2.0 * (volume[run] - range[0]) / (range[1] - range[0]) - 1.0;
-    }
+/* Map volumes to -1 to 1.
+ * @param range   written: the smallest and the largest
+ * @param mapped  [runs] written; it may be `volume` */
+static void map_to_unit(size_t runs, const double *volume, double range[2], double *mapped) {
+  range[0] = range[1] = volume[0];
+  for (size_t run = 0; run < runs; ++run) {
+    range[0] = fmin(range[0], volume[run]);
+    range[1] = fmax(range[1], volume[run]);
   }
+  for (size_t run = 0; run < runs; ++run) {
+    mapped[run] = 2.0 * (volume[run] - range[0]) / (range[1] - range[0]) - 1.0;
+  }
+}
+
+void supine_fields_map_totals(const supine_fit *fit, double *total, double range[2]) {
+  const size_t m = fit->fields->run_count;
+  memset(total, 0, m * sizeof *total);
+  for (size_t i = 0; i < m * fit->lungs->lung_count; ++i) {
+    total[i % m] += fit->volume[i];
+  }
+  map_to_unit(m, total, range, total);
 }
 
 /* Groups of runs that are being made. */
@@ -203,7 +210,9 @@ supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error
   }
   fit->direction_groups = groups.count;
   if (levels > 1) {
-    map_volumes(fit);
+    for (size_t lung = 0; lung < lungs; ++lung) {
+      map_to_unit(m, fit->volume + lung * m, fit->range[lung], fit->parameter + lung * m);
+    }
     for (size_t rank = 1; rank + 1 < levels; ++rank) {
       grouping_add(&groups, place, rank);
     }

@@ -19,4 +19,9 @@ size_t supine_fields_number_directions(const supine_fields *fields, size_t *dire
  * @retval SUPINE_ERROR_OPEN_SURFACE  directions are repeated, but the surface has no volume */
 supine_status supine_fields_volumes_measure(supine_fit *fit, supine_error *error);
 
+/** Map the total volume of the lungs in each run to -1 to 1 over all that was simulated.
+ * @param total  [runs] written
+ * @param range  written: total volumes at -1 and 1, mL above the surface */
+void supine_fields_map_totals(const supine_fit *fit, double *total, double range[2]);
+
 #endif

@@ -177,11 +177,11 @@ static double stated_number(const supine_basis *basis, const char *key) {
 }
 
 /* Print what the runs that were left out say of other states: over all directions of gravity, and
- * in the direction farthest from those of the runs. */
+ * where it is largest: in the direction farthest from those of the runs, at one volume. */
 static void print_between(const supine_basis *basis) {
   supine_options_line("states between the runs: %.3g %%, %s mm RMS over all directions of gravity; "
-                      "in the largest gap\n"
-                      "between the directions: %.3g %%, %s mm RMS\n",
+                      "largest in a\n"
+                      "gap between the directions: %.3g %%, %s mm RMS\n",
                       stated_number(basis, "error_between_percent"),
                       supine_text_distance(stated_number(basis, "error_between_mm")).text,
                       stated_number(basis, "error_gap_percent"),

@@ -398,6 +398,10 @@ static void add_volumes(const fixture *f, tensors *t) {
     add_tensor(
         t, (supine_tensor){"error_gravity", SUPINE_F64, 2, {shape[0], shape[1]}, f->error_gravity});
   }
+  if (f->error_volume != NULL) {
+    add_tensor(t, (supine_tensor){
+                      "error_volume", SUPINE_F64, 1, {f->error_volume_count}, f->error_volume});
+  }
   if (f->held != NULL) {
     add_tensor(t, (supine_tensor){"volume_range", SUPINE_F64, 3, {27, g, 2}, f->held});
   }

@@ -47,7 +47,9 @@ typedef struct fixture {
   const double *full;          /* [lungs, 9] volume at full inflation, or NULL */
   const float *vertex_error;   /* [vertices] mm (tensor 'error_vertices'), or NULL */
   const double *error_gravity; /* [2 band + 4, (band + 2)^2] (tensor 'error_gravity'), or NULL */
-  const float *error_share;    /* [vertices] (tensor 'error_share'), or NULL */
+  size_t error_volume_count;
+  const double *error_volume; /* [error_volume_count] (tensor 'error_volume'), or NULL */
+  const float *error_share;   /* [vertices] (tensor 'error_share'), or NULL */
   size_t landmark_count;
   const float *landmarks; /* [landmark_count, 4] (tensor 'landmarks'), or NULL */
   const double *held;     /* [27, lungs, 2] volumes that the lungs can hold, mL, or NULL */

@@ -165,6 +165,18 @@ static void check_vertices(const supine_basis *basis, double *square, size_t sta
   assert_true(square[n / 2] > 1.0 && square[n / 2] < 3.0);
 }
 
+/* Assert that stored errors in gaps between directions follow the volume as displace() does: what a
+ * fit misses of its functions of gravity is multiplied by 1 - 0.6 s. */
+static void check_volume_factors(const supine_basis *basis) {
+  const supine_tensor *stored = supine_basis_tensor(basis, "error_volume");
+  const double *factor = stored->data;
+  assert_int_equal(stored->shape[0], VOLUMES);
+  for (size_t k = 1; k < VOLUMES; ++k) {
+    const double expected = 1.0 - 0.6 * (double)k / (VOLUMES - 1.0);
+    assert_close(sqrt(factor[k] / factor[0]), expected, 0.03);
+  }
+}
+
 /* Assert that states which were not simulated come back within `limit`, relative RMS, with the
  * volumes that were asked. */
 static void check_states(const supine_basis *basis, double limit) {
@@ -216,6 +228,7 @@ static void check_storage(supine_warp_storage storage, bool clusters) {
   assert_int_equal(report.fit.volume_count, VOLUMES);
   assert_true(report.accuracy.relative_rms < 0.01 && report.accuracy.relative_rms > 1e-4);
   check_states(basis, 2.0 * report.accuracy.relative_rms);
+  check_volume_factors(basis);
   supine_basis_close(basis);
   free(bytes.data);
   supine_fields_free(&fields);

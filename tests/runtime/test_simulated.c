@@ -488,6 +488,34 @@ TEST(test_open_wrong_simulated_volumes_refused_with_reason) {
   end();
 }
 
+/* Write factors for three volumes, and assert that they multiply the square of the error along z
+ * that check_error_along_gravity has written, but not that of its constant. */
+static void check_error_by_volume(void) {
+  static const double wrong[] = {7, -1e-9, 3};
+  static const double volume[] = {7, 1, 3};
+  static const double expected[] = {4.2720018726587655, 3.2015621187164243}; /* 4 and 2 between */
+  float sigma[60];
+  f->error_volume = volume;
+  f->error_volume_count = 3;
+  open_again();
+  for (size_t k = 0; k < 2; ++k) {
+    const double part = k == 0 ? 0.25 : 0.75;
+    const double ml = f->total[0] + part * (f->total[1] - f->total[0]);
+    const supine_state along = state_of((const double[3]){0, 0, -1}, SUPINE_VOLUME_SCAN, ml);
+    assert_int_equal(supine_expected_error(basis, &along, NULL, sigma, NULL), SUPINE_OK);
+    for (size_t i = 0; i < 60; ++i) {
+      assert_true(fabs((double)sigma[i] - expected[k] * (double)f->vertex_error[i]) < 1e-5);
+    }
+  }
+  f->error_volume_count = 1;
+  assert_refused("tensor 'error_volume' has less than two numbers, or one below 0");
+  f->error_volume_count = 3;
+  f->error_volume = wrong;
+  assert_refused("tensor 'error_volume' has less than two numbers, or one below 0");
+  f->error_volume = NULL;
+  open_again();
+}
+
 /* Write errors that are 1.5 times those stored, but sqrt(1.5^2 + (2 z)^2) times along z, and assert
  * that both are stated, and combined for a displacement. Y(0, 0) is sqrt(1 / (4 pi)), and Y(1, 0)
  * is sqrt(3 / (4 pi)) z; index 2. */
@@ -508,6 +536,7 @@ static void check_error_along_gravity(void) {
       assert_true(fabs((double)sigma[i] - factor[k] * (double)f->vertex_error[i]) < 1e-6);
     }
   }
+  check_error_by_volume();
   harmonics[1][1] = NAN;
   assert_refused("tensor 'error_gravity' has a number that is not finite");
   f->error_gravity = NULL;

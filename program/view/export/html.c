@@ -378,9 +378,13 @@ static supine_status add_tensors(page *p) {
   }
   if (info->is_fields && supine_basis_tensor(p->basis, "error_vertices") != NULL) {
     const supine_tensor *gravity = supine_basis_tensor(p->basis, "error_gravity");
+    const supine_tensor *volume = supine_basis_tensor(p->basis, "error_volume");
     SUPINE_TRY(add_rows(p, "error_vertices", info, 1, 1, error_row));
     if (gravity != NULL) {
       SUPINE_TRY(add_doubles(p, "error_gravity", gravity));
+    }
+    if (volume != NULL) {
+      SUPINE_TRY(add_doubles(p, "error_volume", volume));
     }
   }
   SUPINE_TRY(add_corners(p, "triangles", p->order.corners, p->order.corner_begin[info->lung_count],

@@ -188,6 +188,8 @@ function takeSurface(basis) {
     tensors.error_vertices = [[n], Float32Array.from({ length: n }, (_, v) => basis.errorUnit * counts[2 * v])];
     const harmonics = takeTensor('error_gravity', Float64Array);
     tensors.error_gravity = [[2 * basis.band + 4, (basis.band + 2) ** 2], harmonics];
+    const factors = takeTensor('error_volume', Float64Array);
+    tensors.error_volume = [[factors?.length], factors];
   }
   return tensors;
 }

@@ -100,7 +100,11 @@ typedef enum supine_expected_term {
  * all directions of gravity, it is that of the tensor "error_vertices"; with gravity g it is
  * |E y(g)| times as large, where y has the harmonics of g to degree L + 1, and E is the tensor
  * "error_gravity" [2 L + 4, (L + 2)^2]. This is least near the directions of the runs and largest
- * in the gaps between them. The errors of two states are independent.
+ * in the gaps between them. The first row of E is constant. The squares of the others are
+ * multiplied by a factor that depends on the total volume of the lungs: by linear interpolation
+ * between those of the tensor "error_volume" [V], which are at evenly spaced volumes from the
+ * smallest to the largest simulated; 1 without this tensor. The errors of two states are
+ * independent.
  *
  * Full inflation was assumed if the file was scanned at rest, and the volume at rest if it was not;
  * neither was, if the file has metadata "resting_known". Cost: up to eight evaluations of every
