@@ -54,6 +54,16 @@ int supine_print_text(char *text, size_t size, const char *format, ...) {
   return length;
 }
 
+void supine_writer_add(supine_writer *to, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  const size_t at = to->length < to->size ? to->length : to->size;
+  const int count = supine_print_text_list(to->size > at ? to->text + at : NULL, to->size - at,
+                                           format, arguments);
+  va_end(arguments);
+  to->length += count > 0 ? (size_t)count : 0;
+}
+
 int supine_print_list(FILE *file, const char *format, va_list arguments) {
   SUPINE_C_LOCALE;
   return vfprintf(file, format, arguments);

@@ -31,6 +31,17 @@ int supine_print_text(char *text, size_t size, const char *format, ...);
 SUPINE_PRINTF(3, 0)
 int supine_print_text_list(char *text, size_t size, const char *format, va_list arguments);
 
+/** A text that is written in parts: what does not fit into `size` bytes is cut off. */
+typedef struct supine_writer {
+  char *text;
+  size_t size;
+  size_t length; /**< of the whole text */
+} supine_writer;
+
+/** Append to a text, as supine_print_text. */
+SUPINE_PRINTF(2, 3)
+void supine_writer_add(supine_writer *writer, const char *format, ...);
+
 /** As supine_print_text, to a file, like fprintf; ferror tells whether writing failed. */
 SUPINE_PRINTF(2, 3) int supine_print(FILE *file, const char *format, ...);
 

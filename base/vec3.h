@@ -5,9 +5,19 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 
 static inline double supine_dot(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/** Return the sum of the products of two lists of numbers. */
+static inline double supine_dot_n(size_t count, const double *a, const double *b) {
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    sum += a[i] * b[i];
+  }
+  return sum;
 }
 
 /** Compute a x b; `product` must be neither `a` nor `b`. */
@@ -31,6 +41,27 @@ static inline double supine_length(const double v[3]) {
 static inline void supine_subtract(const double a[3], const double b[3], double difference[3]) {
   for (int k = 0; k < 3; ++k) {
     difference[k] = a[k] - b[k];
+  }
+}
+
+/** Compute the eigenvalues of a symmetric matrix [Smith 1961, Commun ACM 4(4), 168], largest
+ * first. */
+static inline void supine_eigenvalues(const double m[3][3], double value[3]) {
+  const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3.0;
+  double square = 0.0;
+  double rest[3][3];
+  for (int k = 0; k < 9; ++k) {
+    rest[k / 3][k % 3] = m[k / 3][k % 3] - (k / 3 == k % 3 ? mean : 0.0);
+    square += rest[k / 3][k % 3] * rest[k / 3][k % 3];
+  }
+  const double p = sqrt(square / 6.0);
+  double cosine = 1.0;
+  if (p > 0.0) {
+    cosine = 0.5 * supine_triple(rest[0], rest[1], rest[2]) / (p * p * p);
+  }
+  const double angle = acos(fmin(fmax(cosine, -1.0), 1.0)) / 3.0;
+  for (int k = 0; k < 3; ++k) {
+    value[k] = mean + 2.0 * p * cos(angle - 2.0943951023931953 * k); /* 2 pi / 3 */
   }
 }
 

@@ -14,69 +14,17 @@ static const double filled = 0.7;
 /* Least sum of the vectors of area of an open surface, as a share of its area. */
 static const double gap_share = 1e-3;
 
-/* Compute the eigenvalues of a symmetric matrix [Smith 1961, Commun ACM 4(4), 168], largest
- * first. */
-static void eigenvalues(const double m[3][3], double value[3]) {
-  const double mean = (m[0][0] + m[1][1] + m[2][2]) / 3.0;
-  double square = 0.0;
-  double rest[3][3];
-  for (size_t k = 0; k < 9; ++k) {
-    rest[k / 3][k % 3] = m[k / 3][k % 3] - (k / 3 == k % 3 ? mean : 0.0);
-    square += rest[k / 3][k % 3] * rest[k / 3][k % 3];
-  }
-  const double p = sqrt(square / 6.0);
-  double cosine = 1.0;
-  if (p > 0.0) {
-    cosine = 0.5 * supine_triple(rest[0], rest[1], rest[2]) / (p * p * p);
-  }
-  const double angle = acos(fmin(fmax(cosine, -1.0), 1.0)) / 3.0;
-  for (size_t k = 0; k < 3; ++k) {
-    value[k] = mean + 2.0 * p * cos(angle - 2.0943951023931953 * (double)k); /* 2 pi / 3 */
-  }
-}
-
 bool supine_mesh_is_compact(double volume, const double covariance[3][3]) {
   double value[3];
   if (!(volume >= SUPINE_COMPACT_LEAST_ML && volume <= SUPINE_COMPACT_MOST_ML)) {
     return false;
   }
-  eigenvalues(covariance, value);
+  supine_eigenvalues(covariance, value);
   /* A solid ellipsoid has the semi-axes sqrt(5) SD. */
   const double sd[3] = {sqrt(value[0]), sqrt(fmax(value[1], 0.0)), sqrt(fmax(value[2], 0.0))};
   const double least = fmin(sd[1], sd[2]);
   const double ellipsoid = 4.1887902047863905e-3 * pow(5.0, 1.5) * sd[0] * sd[1] * sd[2];
   return least >= slender * sd[0] && volume >= filled * ellipsoid;
-}
-
-static uint32_t root_of(uint32_t *parent, uint32_t i) {
-  while (parent[i] != i) {
-    parent[i] = parent[parent[i]];
-    i = parent[i];
-  }
-  return i;
-}
-
-/* Number the connected components of a mesh, and return how many there are.
- * @param component  [vertex_count] written: index of the component of each vertex */
-static size_t number_components(const supine_mesh *mesh, uint32_t *component) {
-  size_t count = 0;
-  for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
-    component[i] = i;
-  }
-  for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
-    const uint32_t next = mesh->triangles[i % 3 < 2 ? i + 1 : i - 2];
-    const uint32_t a = root_of(component, mesh->triangles[i]);
-    const uint32_t b = root_of(component, next);
-    if (a < b) {
-      component[b] = a;
-    } else {
-      component[a] = b;
-    }
-  }
-  for (size_t i = 0; i < mesh->vertex_count; ++i) { /* parents have lower indices */
-    component[i] = component[i] == i ? (uint32_t)count++ : component[component[i]];
-  }
-  return count;
 }
 
 /* What a component encloses: moments of the solid, relative to the first vertex of the mesh, so
@@ -159,7 +107,8 @@ static void place_cavities(solid *solids, size_t count) {
 
 supine_status supine_mesh_find_compact(const supine_mesh *mesh, uint32_t *part, uint32_t *count) {
   SUPINE_ARENA arena = {0};
-  const size_t found = number_components(mesh, part);
+  const size_t found =
+      supine_mesh_components(mesh->vertex_count, 3, mesh->triangle_count, mesh->triangles, part);
   solid *solids = supine_arena_zeros(&arena, found, sizeof *solids);
   *count = 0;
   SUPINE_TRY(supine_arena_status(&arena));

@@ -106,6 +106,13 @@ typedef struct supine_topology {
   bool closed; /**< whether every edge joins exactly two triangles of the same orientation */
 } supine_topology;
 
+/** Number the sets of vertices that faces connect, and return how many there are.
+ * @param corners    vertices of a face: 3 for triangles, 2 for edges
+ * @param faces      [count, corners] indices of vertices
+ * @param component  [vertex_count] written: index of the component of each vertex */
+size_t supine_mesh_components(size_t vertex_count, size_t corners, size_t count,
+                              const uint32_t *faces, uint32_t *component);
+
 /** Find edges and components in linear time, except for sorting the edges of each vertex.
  * @param topology  zero-initialised; written only on success */
 supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topology *topology);

@@ -97,20 +97,23 @@ static uint32_t tree_root(uint32_t *parent, uint32_t i) {
   return i;
 }
 
-static void components_find(size_t vertex_count, supine_topology *topology) {
-  uint32_t *parent = topology->component;
+size_t supine_mesh_components(size_t vertex_count, size_t corners, size_t count,
+                              const uint32_t *faces, uint32_t *component) {
+  uint32_t *parent = component;
+  size_t found = 0;
   for (size_t i = 0; i < vertex_count; ++i) {
     parent[i] = (uint32_t)i;
   }
-  for (size_t e = 0; e < topology->edge_count; ++e) {
-    const uint32_t a = tree_root(parent, topology->edges[2 * e]);
-    const uint32_t b = tree_root(parent, topology->edges[2 * e + 1]);
+  for (size_t i = 0; i < corners * count; ++i) {
+    const uint32_t a = tree_root(parent, faces[i]);
+    const uint32_t b = tree_root(parent, faces[i / corners * corners]);
     parent[a > b ? a : b] = a < b ? a : b;
   }
   /* Number the components. Each vertex takes the number of its parent, whose index is lower. */
   for (size_t i = 0; i < vertex_count; ++i) {
-    parent[i] = parent[i] == i ? (uint32_t)topology->component_count++ : parent[parent[i]];
+    parent[i] = parent[i] == i ? (uint32_t)found++ : parent[parent[i]];
   }
+  return found;
 }
 
 static bool triangles_legal(const supine_mesh *mesh) {
@@ -147,7 +150,8 @@ supine_status supine_mesh_topology_create(const supine_mesh *mesh, supine_topolo
     *edge++ = sides[i].low;
     *edge++ = sides[i].high;
   }
-  components_find(vertices, &result);
+  result.component_count =
+      supine_mesh_components(vertices, 2, result.edge_count, result.edges, result.component);
 
   result.euler_characteristic =
       (long)vertices - (long)result.edge_count + (long)mesh->triangle_count;

@@ -14,16 +14,12 @@ enum { STATES = SUPINE_DOUBT_STATES_MAX, SWEEPS = 40 };
 /* Ratio of the deviation of each axis to the expected error: 4/9 of its square. */
 static const double axis_share = 2.0 / 3.0;
 
-/* Doubles that a struct of `bytes` takes. */
-static size_t doubles_of(size_t bytes) {
-  return (bytes + sizeof(double) - 1) / sizeof(double);
-}
-
 size_t supine_doubt_space(const supine_basis *basis, size_t state_count) {
   const size_t n = basis->landmark_count;
-  const size_t seen = doubles_of(sizeof(supine_kriging)) +
-                      doubles_of(n * sizeof(supine_kriging_point)) + supine_kriging_space(n);
-  return doubles_of(sizeof(supine_doubt) + state_count * sizeof(supine_expected_model)) +
+  const size_t seen = supine_space_doubles(sizeof(supine_kriging)) +
+                      supine_space_doubles(n * sizeof(supine_kriging_point)) +
+                      supine_kriging_space(n);
+  return supine_space_doubles(sizeof(supine_doubt) + state_count * sizeof(supine_expected_model)) +
          (n > 0 ? seen : 0);
 }
 
@@ -170,11 +166,11 @@ supine_status supine_doubt_prepare(const supine_doubt_task *task, double *space,
     SUPINE_TRY(prepare_states(task, from, d, error));
     const size_t n = task->basis->landmark_count;
     if (n > 0) {
-      space += doubles_of(sizeof *d + task->state_count * sizeof *d->model);
+      space += supine_space_doubles(sizeof *d + task->state_count * sizeof *d->model);
       supine_kriging *seen = (supine_kriging *)space;
-      space += doubles_of(sizeof *seen);
+      space += supine_space_doubles(sizeof *seen);
       supine_kriging_point *points = (supine_kriging_point *)space;
-      space += doubles_of(n * sizeof *points);
+      space += supine_space_doubles(n * sizeof *points);
       SUPINE_TRY(supine_expected_fit_landmarks(task->basis, points, space, seen, error));
       d->seen = seen;
     }

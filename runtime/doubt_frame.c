@@ -35,8 +35,7 @@ struct supine_doubt_frame {
 };
 
 static size_t struct_space(size_t count) {
-  const size_t bytes = sizeof(supine_doubt_frame) + count * sizeof(fiducial);
-  return (bytes + sizeof(double) - 1) / sizeof(double);
+  return supine_space_doubles(sizeof(supine_doubt_frame) + count * sizeof(fiducial));
 }
 
 size_t supine_doubt_frame_space(const supine_basis *basis, size_t count) {
@@ -50,22 +49,6 @@ static double covary(const supine_doubt_frame *f, const supine_doubt_features *a
   supine_doubt_covary(f->doubt, at, white, &f->fiducial[i].features,
                       f->white + i * f->doubt->basis->landmark_count, covariance);
   return covariance[0];
-}
-
-/* Return the smallest eigenvalue of a symmetric matrix. */
-static double smallest_eigenvalue(double a[3][3]) {
-  const double mean = (a[0][0] + a[1][1] + a[2][2]) / 3;
-  double square = 0;
-  for (size_t k = 0; k < 9; ++k) {
-    square += pow(a[k / 3][k % 3] - (k % 4 == 0 ? mean : 0), 2) / 6;
-  }
-  const double size = sqrt(square);
-  double b[3][3];
-  for (size_t k = 0; k < 9; ++k) {
-    b[k / 3][k % 3] = size > 0 ? (a[k / 3][k % 3] - (k % 4 == 0 ? mean : 0)) / size : 0;
-  }
-  const double half = fmax(-1, fmin(1, supine_triple(b[0], b[1], b[2]) / 2));
-  return mean + 2 * size * cos(acos(half) / 3 + 2.0943951023931955);
 }
 
 /* Solve T x = b for each column of a matrix by Cramer's rule, T symmetric. */
@@ -89,7 +72,9 @@ static double set_weights(supine_doubt_frame *f) {
       t[k / 3][k % 3] += (k % 4 == 0 ? supine_dot(q, q) : 0) - q[k / 3] * q[k % 3];
     }
   }
-  const double least = smallest_eigenvalue(t);
+  double value[3];
+  supine_eigenvalues((const double(*)[3])t, value);
+  const double least = value[2];
   if (!(least > 0)) {
     return 0;
   }

@@ -58,7 +58,7 @@ size_t supine_doubt_mend_space(const supine_basis *basis) {
   const supine_basis_info *info = supine_basis_get_info(basis);
   const size_t floats = 3 * info->vertex_count * (2 + info->lung_count);
   const size_t bytes = sizeof(supine_doubt_mend) + CELLS * sizeof(cell) + floats * sizeof(float);
-  return (bytes + sizeof(double) - 1) / sizeof(double) + supine_doubt_shape_space(basis);
+  return supine_space_doubles(bytes) + supine_doubt_shape_space(basis);
 }
 
 /* Return the index of the cell of a vertex in the box of its lung. */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* List what a basis assumes and what it was given. */
 #include <math.h>
-#include <stdarg.h>
 #include <string.h>
 
 #include <supine/facts.h>
@@ -281,40 +280,24 @@ size_t supine_basis_facts(const supine_basis *basis, supine_fact facts[SUPINE_FA
   return count;
 }
 
-/* A text that is built from parts; what does not fit is counted, but cut off. */
-typedef struct line {
-  char *text;
-  size_t size, length;
-} line;
-
-SUPINE_PRINTF(2, 3)
-static void append(line *to, const char *format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  const size_t at = to->length < to->size ? to->length : to->size;
-  const int count = supine_print_text_list(to->size > at ? to->text + at : NULL, to->size - at,
-                                           format, arguments);
-  va_end(arguments);
-  to->length += count > 0 ? (size_t)count : 0;
-}
-
 /* Append the words, the number and the range of a fact. */
-static void append_value(line *to, const supine_fact *fact) {
+static void append_value(supine_writer *to, const supine_fact *fact) {
   const int decimals = strcmp(fact->unit, "mm") == 0 ? 1 : 0;
-  append(to, "%s", fact->text);
+  supine_writer_add(to, "%s", fact->text);
   if (isfinite(fact->value)) {
-    append(to, "%s%.*f %s", fact->text[0] != '\0' ? ", " : "", decimals, fact->value, fact->unit);
+    supine_writer_add(to, "%s%.*f %s", fact->text[0] != '\0' ? ", " : "", decimals, fact->value,
+                      fact->unit);
   }
   if (isfinite(fact->low)) {
-    append(to, " (%.*f to %.*f)", decimals, fact->low, decimals, fact->high);
+    supine_writer_add(to, " (%.*f to %.*f)", decimals, fact->low, decimals, fact->high);
   }
 }
 
 size_t supine_fact_print(const supine_fact *fact, char *text, size_t size) {
-  line to = {.text = text, .size = size};
+  supine_writer to = {.text = text, .size = size};
   append_value(&to, fact);
-  append(&to, ", %s%s%s", supine_fact_source_name(fact->source), fact->origin[0] != '\0' ? " " : "",
-         fact->origin);
+  supine_writer_add(&to, ", %s%s%s", supine_fact_source_name(fact->source),
+                    fact->origin[0] != '\0' ? " " : "", fact->origin);
   return to.length;
 }
 
@@ -328,7 +311,7 @@ size_t supine_basis_caveats(const supine_basis *basis, char *text, size_t size) 
                                              SUPINE_SOURCE_ASSUMED};
   supine_fact facts[SUPINE_FACTS_MAX];
   const size_t count = supine_basis_facts(basis, facts);
-  line to = {.text = text, .size = size};
+  supine_writer to = {.text = text, .size = size};
   if (size > 0) {
     text[0] = '\0';
   }
@@ -336,9 +319,9 @@ size_t supine_basis_caveats(const supine_basis *basis, char *text, size_t size) 
     bool first = true;
     for (size_t i = 0; i < count; ++i) {
       if (facts[i].source == order[k]) {
-        append(&to, "%s", first && to.length > 0 ? "; " : "");
-        append(&to, first ? "%s: " : ", ", supine_fact_source_name(order[k]));
-        append(&to, "%s ", facts[i].name);
+        supine_writer_add(&to, "%s", first && to.length > 0 ? "; " : "");
+        supine_writer_add(&to, first ? "%s: " : ", ", supine_fact_source_name(order[k]));
+        supine_writer_add(&to, "%s ", facts[i].name);
         append_value(&to, &facts[i]);
         first = false;
       }

@@ -139,6 +139,11 @@ static inline double supine_basis_sum_harmonics(const double *row, const double 
   return sum;
 }
 
+/** Return the number of doubles that `bytes` take, in the work space of callers. */
+static inline size_t supine_space_doubles(size_t bytes) {
+  return (bytes + sizeof(double) - 1) / sizeof(double);
+}
+
 /** Find the lungs that a state names.
  * @param lungs  written: lungs[i] is the index of the lung that state->lungs[i] names
  * @retval SUPINE_ERROR_ARGUMENT  not all lungs are named, or a name is unknown or given twice */

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "runtime/kriging.h"
 
 enum { ONE = 0, VOLUME = 1, PLACE = 4, VALUE = 7, TERMS = SUPINE_KRIGING_TERMS };
@@ -36,14 +37,6 @@ static void whiten(supine_kriging *fit) {
   for (size_t c = 0; c < SUPINE_KRIGING_COLUMNS; ++c) {
     supine_kriging_forward(n, fit->factor, fit->whitened + c * n);
   }
-}
-
-static double dot(size_t count, const double *a, const double *b) {
-  double sum = 0;
-  for (size_t i = 0; i < count; ++i) {
-    sum += a[i] * b[i];
-  }
-  return sum;
 }
 
 static bool is_known(const supine_kriging_options *options, size_t term) {
@@ -111,18 +104,18 @@ static void normal_equations(const supine_kriging *fit, const supine_kriging_opt
     for (size_t axis = 0; axis < 3; ++axis) {
       double sign = 0;
       const double *x = fit->whitened + (size_t)supine_kriging_column(k, axis, &sign) * n;
-      right[k] += sign * dot(n, x, fit->whitened + (VALUE + axis) * n);
+      right[k] += sign * supine_dot_n(n, x, fit->whitened + (VALUE + axis) * n);
       for (size_t l = 0; l <= k; ++l) {
         double other = 0;
         const double *z = fit->whitened + (size_t)supine_kriging_column(l, axis, &other) * n;
-        a[k * TERMS + l] += is_known(options, l) ? 0 : sign * other * dot(n, x, z);
+        a[k * TERMS + l] += is_known(options, l) ? 0 : sign * other * supine_dot_n(n, x, z);
       }
     }
     if (fit->lines != NULL) {
       const double *seen = fit->along + k * n;
-      right[k] -= dot(n, seen, fit->along + TERMS * n);
+      right[k] -= supine_dot_n(n, seen, fit->along + TERMS * n);
       for (size_t l = 0; l <= k; ++l) {
-        a[k * TERMS + l] -= is_known(options, l) ? 0 : dot(n, seen, fit->along + l * n);
+        a[k * TERMS + l] -= is_known(options, l) ? 0 : supine_dot_n(n, seen, fit->along + l * n);
       }
     }
   }
@@ -155,8 +148,9 @@ static void solve_terms(supine_kriging *fit, const supine_kriging_options *optio
   memset(fit->spread, 0, sizeof fit->spread);
   for (size_t k = 0; k < TERMS; ++k) {
     for (size_t l = 0; l < TERMS; ++l) {
-      const double c =
-          is_known(options, k) || is_known(options, l) ? 0 : dot(TERMS, inverse[k], inverse[l]);
+      const double c = is_known(options, k) || is_known(options, l)
+                           ? 0
+                           : supine_dot_n(TERMS, inverse[k], inverse[l]);
       fit->covariance[k][l] = c;
       fit->terms[k] += c * right[l];
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -190,7 +184,7 @@ static double find_likelihood(const supine_kriging *fit, const supine_kriging_op
                               const double factor[TERMS * TERMS], const double right[TERMS]) {
   const size_t n = fit->count;
   const double shift = options->axis_deviation;
-  double sum = -dot(TERMS, fit->terms, right);
+  double sum = -supine_dot_n(TERMS, fit->terms, right);
   for (size_t i = 0; i < n; ++i) {
     sum += 6 * log(fit->factor[i * n + i]);
   }
@@ -202,11 +196,11 @@ static double find_likelihood(const supine_kriging *fit, const supine_kriging_op
   }
   for (size_t axis = 0; axis < 3; ++axis) {
     const double *y = fit->whitened + (VALUE + axis) * n;
-    sum += dot(n, y, y);
+    sum += supine_dot_n(n, y, y);
   }
   if (fit->lines != NULL) {
     const double *y = fit->along + TERMS * n;
-    sum -= dot(n, y, y);
+    sum -= supine_dot_n(n, y, y);
     for (size_t i = 0; i < n; ++i) {
       sum += 2 * log(fit->lines[i * n + i]);
     }
@@ -292,16 +286,16 @@ static void leave_out_block(const supine_kriging *fit, size_t left, const double
     for (size_t k = 0; k < TERMS; ++k) {
       double sign = 0;
       const double *column = fit->whitened + (size_t)supine_kriging_column(k, i % 3, &sign) * n;
-      terms[i][k] = sign * dot(n, row, column);
-      terms[i][k] -= fit->lines != NULL ? dot(n, fit->along + k * n, seen + i * n) : 0;
+      terms[i][k] = sign * supine_dot_n(n, row, column);
+      terms[i][k] -= fit->lines != NULL ? supine_dot_n(n, fit->along + k * n, seen + i * n) : 0;
     }
   }
   for (size_t i = 0; i < 3 * left; ++i) {
     for (size_t j = 0; j < 3 * left; ++j) {
-      double sum = i % 3 == j % 3 ? dot(n, rows + i / 3 * n, rows + j / 3 * n) : 0;
-      sum -= fit->lines != NULL ? dot(n, seen + i * n, seen + j * n) : 0;
+      double sum = i % 3 == j % 3 ? supine_dot_n(n, rows + i / 3 * n, rows + j / 3 * n) : 0;
+      sum -= fit->lines != NULL ? supine_dot_n(n, seen + i * n, seen + j * n) : 0;
       for (size_t k = 0; k < TERMS; ++k) {
-        sum -= terms[i][k] * dot(TERMS, fit->covariance[k], terms[j]);
+        sum -= terms[i][k] * supine_dot_n(TERMS, fit->covariance[k], terms[j]);
       }
       block[i * 3 * left + j] = sum;
     }
@@ -330,9 +324,9 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t left, const si
   for (size_t i = 0; i < size; ++i) {
     const supine_kriging_point *p = &fit->points[points[i / 3]];
     const double *row = scratch + i / 3 * n;
-    const double scale = dot(n, row, row);
+    const double scale = supine_dot_n(n, row, row);
     least[i] = 1e-9 * scale;
-    solved[i] = dot(n, row, fit->weights + i % 3 * n);
+    solved[i] = supine_dot_n(n, row, fit->weights + i % 3 * n);
     for (size_t k = 0; k < 3; ++k) { /* along a line, the block is 0 */
       block[i * size + i / 3 * 3 + k] += scale * p->direction[i % 3] * p->direction[k];
     }
@@ -350,8 +344,8 @@ double supine_kriging_leave_out(const supine_kriging *fit, size_t left, const si
     double unit[LEFT_MAX] = {0};
     unit[k] = 1;
     supine_kriging_forward(size, block, unit);
-    trace += dot(size, unit, unit);
-    residual[k] = dot(size, unit, solved);
+    trace += supine_dot_n(size, unit, unit);
+    residual[k] = supine_dot_n(size, unit, solved);
   }
   return sqrt(fmax(0, trace));
 }

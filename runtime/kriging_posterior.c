@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "runtime/kriging.h"
 
 enum { ONE = 0, VOLUME = 1, PLACE = 4, TERMS = SUPINE_KRIGING_TERMS };
@@ -11,14 +12,6 @@ enum { ONE = 0, VOLUME = 1, PLACE = 4, TERMS = SUPINE_KRIGING_TERMS };
 /* Variance of a landmark of a fit, as a share of that of the field: about 2 mm on each axis where
  * the field has 6 mm. */
 static const double noise_share = 0.1;
-
-static double dot(size_t count, const double *a, const double *b) {
-  double sum = 0;
-  for (size_t i = 0; i < count; ++i) {
-    sum += a[i] * b[i];
-  }
-  return sum;
-}
 
 void supine_kriging_whiten(const supine_kriging *fit, const supine_kriging_point *at, double *w) {
   for (size_t j = 0; j < fit->count; ++j) {
@@ -55,9 +48,9 @@ static void find_unknown(const supine_kriging *fit, const supine_kriging_point *
     const size_t k = e % TERMS;
     double sign = 0;
     const size_t column = (size_t)supine_kriging_column(k, axis, &sign);
-    left->terms[axis][k] = sign * (row[column] - dot(n, w, fit->whitened + column * n));
+    left->terms[axis][k] = sign * (row[column] - supine_dot_n(n, w, fit->whitened + column * n));
     if (fit->lines != NULL) {
-      left->terms[axis][k] += dot(n, left->along + axis * n, fit->along + k * n);
+      left->terms[axis][k] += supine_dot_n(n, left->along + axis * n, fit->along + k * n);
     }
   }
 }
@@ -68,7 +61,7 @@ void supine_kriging_covary(const supine_kriging *fit, const supine_kriging_point
   const size_t n = fit->count;
   const double field = supine_kriging_covariance(&fit->model, a->position, a->size, b->position,
                                                  b->size, a->lung == b->lung) -
-                       dot(n, a_white, b_white);
+                       supine_dot_n(n, a_white, b_white);
   unknown left[2];
   if (fit->has_terms) {
     find_unknown(fit, a, a_white, &left[0]);
@@ -81,11 +74,11 @@ void supine_kriging_covary(const supine_kriging *fit, const supine_kriging_point
     if (fit->has_terms) {
       for (size_t k = 0; k < TERMS; ++k) {
         covariance[e] +=
-            left[0].terms[row][k] * dot(TERMS, fit->covariance[k], left[1].terms[column]);
+            left[0].terms[row][k] * supine_dot_n(TERMS, fit->covariance[k], left[1].terms[column]);
       }
     }
     if (fit->lines != NULL) {
-      covariance[e] += dot(n, left[0].along + row * n, left[1].along + column * n);
+      covariance[e] += supine_dot_n(n, left[0].along + row * n, left[1].along + column * n);
     }
   }
 }
@@ -117,12 +110,12 @@ void supine_kriging_refit(const supine_kriging *fit, double *residuals, double t
       for (size_t axis = 0; axis < 3; ++axis) {
         double sign = 0;
         const double *x = fit->whitened + (size_t)supine_kriging_column(k, axis, &sign) * n;
-        right[k] += sign * dot(n, x, residuals + axis * n);
+        right[k] += sign * supine_dot_n(n, x, residuals + axis * n);
       }
-      right[k] -= fit->lines != NULL ? dot(n, fit->along + k * n, along) : 0;
+      right[k] -= fit->lines != NULL ? supine_dot_n(n, fit->along + k * n, along) : 0;
     }
     for (size_t k = 0; k < TERMS; ++k) {
-      terms[k] = dot(TERMS, fit->covariance[k], right);
+      terms[k] = supine_dot_n(TERMS, fit->covariance[k], right);
     }
     supine_kriging_subtract_terms(fit, terms, along, residuals);
   }
@@ -164,5 +157,5 @@ supine_status supine_kriging_fit_landmarks(size_t count, const supine_kriging_po
 double supine_kriging_share(const supine_kriging *fit, const supine_kriging_point *at,
                             double *scratch) {
   supine_kriging_whiten(fit, at, scratch);
-  return fmax(0, 1 - dot(fit->count, scratch, scratch));
+  return fmax(0, 1 - supine_dot_n(fit->count, scratch, scratch));
 }

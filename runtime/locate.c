@@ -62,21 +62,18 @@ typedef struct workspace {
   double *seen; /* [task->count, 3] observed positions; on a line, near the prediction, mm */
 } workspace;
 
-static size_t doubles_of(size_t bytes) {
-  return (bytes + sizeof(double) - 1) / sizeof(double);
-}
-
 size_t supine_locate_space(size_t count) {
-  return doubles_of(sizeof(supine_location)) + doubles_of(count * sizeof(supine_kriging_point)) +
-         6 * count + supine_kriging_scratch(count) + supine_kriging_space(count);
+  return supine_space_doubles(sizeof(supine_location)) +
+         supine_space_doubles(count * sizeof(supine_kriging_point)) + 6 * count +
+         supine_kriging_scratch(count) + supine_kriging_space(count);
 }
 
 static void place_in(double *space, size_t count, workspace *s) {
   s->fit = (supine_location *)space;
   s->found = &s->fit->info;
-  space += doubles_of(sizeof *s->fit);
+  space += supine_space_doubles(sizeof *s->fit);
   s->points = (supine_kriging_point *)space;
-  space += doubles_of(count * sizeof *s->points);
+  space += supine_space_doubles(count * sizeof *s->points);
   s->law = space;
   s->seen = space + 3 * count;
   s->kriging = space + 6 * count;

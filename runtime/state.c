@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Parse and print states. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -307,30 +306,12 @@ supine_status supine_state_parse(const char *text, supine_state *state, supine_e
   return SUPINE_OK;
 }
 
-/* A text being written, cut off at `size` bytes. `length` is the length of the whole text. */
-typedef struct writer {
-  char *text;
-  size_t size;
-  size_t length;
-} writer;
-
-SUPINE_PRINTF(2, 3)
-static void add(writer *out, const char *format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  const size_t at = out->length < out->size ? out->length : out->size;
-  const int count = supine_print_text_list(out->size > at ? out->text + at : NULL, out->size - at,
-                                           format, arguments);
-  va_end(arguments);
-  out->length += count > 0 ? (size_t)count : 0;
-}
-
 /* Return whether an angle has at most one decimal. Other angles were given as gravity. */
 static bool is_round(double degrees) {
   return fabs(10 * degrees - round(10 * degrees)) < 1e-6;
 }
 
-static void add_posture(writer *out, const double gravity[3], bool described) {
+static void add_posture(supine_writer *out, const double gravity[3], bool described) {
   enum { PLAIN = 6 }; /* supine, prone, left, right, upright and inverted come first */
   const double degrees = 180 / 3.14159265358979323846;
   const double *g = gravity;
@@ -338,7 +319,8 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
     double named[3];
     (void)supine_posture_gravity(supine_posture_name(i), named);
     if (g[0] * named[0] + g[1] * named[1] + g[2] * named[2] > 1 - 1e-14) {
-      add(out, "%s%s", supine_posture_name(i), described && named[0] != 0 ? " side" : "");
+      supine_writer_add(out, "%s%s", supine_posture_name(i),
+                        described && named[0] != 0 ? " side" : "");
       return;
     }
   }
@@ -346,48 +328,48 @@ static void add_posture(writer *out, const double gravity[3], bool described) {
   const double tilt = atan2(g[2], level) * degrees;
   const double roll = atan2(g[0], g[1]) * degrees;
   if (g[0] == 0) {
-    add(out, "%s%+.9g", supine_posture_name(g[1] >= 0 ? 0U : 1U), tilt);
+    supine_writer_add(out, "%s%+.9g", supine_posture_name(g[1] >= 0 ? 0U : 1U), tilt);
     return;
   }
   if (g[1] == 0 && is_round(tilt)) {
-    add(out, "%s%+.9g", supine_posture_name(g[0] > 0 ? 2U : 3U), tilt);
+    supine_writer_add(out, "%s%+.9g", supine_posture_name(g[0] > 0 ? 2U : 3U), tilt);
     return;
   }
   if (g[2] == 0 && is_round(roll)) {
-    add(out, "supine@%.9g", roll);
+    supine_writer_add(out, "supine@%.9g", roll);
     return;
   }
-  add(out, described ? "gravity %.3g:%.3g:%.3g" : "%.9g:%.9g:%.9g", g[0], g[1], g[2]);
+  supine_writer_add(out, described ? "gravity %.3g:%.3g:%.3g" : "%.9g:%.9g:%.9g", g[0], g[1], g[2]);
 }
 
-static void add_volume(writer *out, const supine_volume *volume, bool described) {
+static void add_volume(supine_writer *out, const supine_volume *volume, bool described) {
   static const char *const phrases[] = {[SUPINE_VOLUME_DEFAULT] = "",
                                         [SUPINE_VOLUME_REST] = "at rest",
                                         [SUPINE_VOLUME_FULL] = "at full inflation",
                                         [SUPINE_VOLUME_SCAN] = "at the scan's volume"};
   if (volume->kind == SUPINE_VOLUME_ABSOLUTE) {
-    add(out, described ? "at %.0f mL" : "%.9gmL", volume->ml);
+    supine_writer_add(out, described ? "at %.0f mL" : "%.9gmL", volume->ml);
     return;
   }
-  add(out, "%s", (described ? phrases : kinds)[volume->kind]);
+  supine_writer_add(out, "%s", (described ? phrases : kinds)[volume->kind]);
   if (volume->ml != 0 && described) {
-    add(out, " %c %.9g mL", volume->ml < 0 ? '-' : '+', fabs(volume->ml));
+    supine_writer_add(out, " %c %.9g mL", volume->ml < 0 ? '-' : '+', fabs(volume->ml));
   } else if (volume->ml != 0) {
-    add(out, "%+.9g", volume->ml);
+    supine_writer_add(out, "%+.9g", volume->ml);
   }
 }
 
 /* Write a state as text to parse, or as a description. */
 static size_t add_state(const supine_state *state, bool described, char *text, size_t size) {
-  writer out = {text, size, 0};
+  supine_writer out = {text, size, 0};
   add_posture(&out, state->gravity, described);
   if (state->lung_count == 0 && state->volume.kind != SUPINE_VOLUME_DEFAULT) {
-    add(&out, described ? " " : ":");
+    supine_writer_add(&out, described ? " " : ":");
     add_volume(&out, &state->volume, described);
   }
   for (size_t i = 0; i < state->lung_count; ++i) {
     const char *format = i == 0 ? ":%s=" : ",%s=";
-    add(&out, described ? ", %s lung " : format, state->lungs[i].name);
+    supine_writer_add(&out, described ? ", %s lung " : format, state->lungs[i].name);
     add_volume(&out, &state->lungs[i].volume, described);
   }
   return out.length;

@@ -5,20 +5,13 @@
 #include <stdbool.h>
 
 #include "base/arena.h"
+#include "base/vec3.h"
 #include "runtime/internal.h"
-
-static double dot(size_t count, const double *a, const double *b) {
-  double sum = 0;
-  for (size_t i = 0; i < count; ++i) {
-    sum += a[i] * b[i];
-  }
-  return sum;
-}
 
 double supine_volume_square(size_t count, const double *form, const double *w) {
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
-    sum += w[i] * dot(count, form + i * count, w);
+    sum += w[i] * supine_dot_n(count, form + i * count, w);
   }
   return sum;
 }
@@ -26,7 +19,7 @@ double supine_volume_square(size_t count, const double *form, const double *w) {
 void supine_volume_contract(size_t count, const double *linear, const double *quadratic,
                             const double *third, const double *weights, supine_volume_form *form) {
   for (size_t axis = 0; axis < 3; ++axis) {
-    form->of[axis] += dot(count, linear + axis * count, weights);
+    form->of[axis] += supine_dot_n(count, linear + axis * count, weights);
     form->of[3 + axis] += supine_volume_square(count, quadratic + axis * count * count, weights);
   }
   for (size_t i = 0; i < count; ++i) {
