@@ -19,11 +19,6 @@
 
 enum { BAND = 23, MODES = 16 }; /* defaults */
 
-static bool go_on(void *context, double fraction) {
-  const supine_precompute_options *options = context;
-  return options->progress == NULL || options->progress(options->context, fraction) == 0;
-}
-
 /* Choose what the basis contains. */
 static supine_status choose(const supine_precompute_modes *wanted, bool is_fields,
                             supine_basis_choice *choice, supine_error *error) {
@@ -133,7 +128,7 @@ supine_status supine_precompute_make(const supine_precompute_options *options,
   supine_basis_report made;
   SUPINE_TRY(choose(&options->modes, options->fields != NULL, &choice, error));
   choice.made_by = options->made_by;
-  choice.progress = go_on;
+  choice.progress = supine_precompute_go_on;
   choice.progress_context = &told;
   if (options->fields != NULL) {
     SUPINE_TRY(load_fields(options->fields, &prepared->source, findings, &fields, &motion, error));

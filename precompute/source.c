@@ -255,7 +255,7 @@ supine_status supine_precompute_source_load(const supine_source_options *options
   return status;
 }
 
-static bool go_on(void *context, double fraction) {
+bool supine_precompute_go_on(void *context, double fraction) {
   const supine_precompute_options *options = context;
   return options->progress == NULL || options->progress(options->context, fraction) == 0;
 }
@@ -271,7 +271,7 @@ supine_status supine_precompute_source_load_lungs(const supine_precompute_option
                                   .labels = {.labels = given->labels,
                                              .edge = given->edge,
                                              .close = given->close,
-                                             .progress = go_on,
+                                             .progress = supine_precompute_go_on,
                                              .progress_context = &told},
                                   .surfaces_out = given->surfaces_out,
                                   .has_midline = given->has_midline || given->midline != 0.0,

@@ -43,4 +43,8 @@ supine_status supine_precompute_source_load(const supine_source_options *options
 supine_status supine_precompute_source_load_lungs(const supine_precompute_options *options,
                                                   supine_source *source, supine_error *error);
 
+/** Report progress to the caller of the library, and return whether to go on.
+ * @param context  supine_precompute_options */
+bool supine_precompute_go_on(void *context, double fraction);
+
 #endif
