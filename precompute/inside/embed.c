@@ -11,6 +11,7 @@
 #include "base/number.h"
 #include "base/parallel.h"
 #include "base/remedy.h"
+#include "base/text.h"
 #include "base/vec3.h"
 #include "runtime/expected.h"
 #include "runtime/rigid.h"
@@ -102,9 +103,8 @@ static void add_name(const char *names, size_t part, char *text, size_t size) {
     }
   }
   const size_t length = strlen(text);
-  (void)snprintf(text + length, size - length, "%s'%.*s'",
-                 length > 0 && text[length - 1] == '\'' ? ", " : "", (int)strcspn(names, "\n"),
-                 names);
+  supine_text_add(text, size, "%s'%.*s'", length > 0 && text[length - 1] == '\'' ? ", " : "",
+                  (int)strcspn(names, "\n"), names);
 }
 
 /* Refuse parts whose nearest point is too far outside the lungs. */

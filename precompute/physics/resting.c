@@ -166,11 +166,11 @@ supine_status supine_physics_resting_give(supine_resting *resting, size_t axis, 
 }
 
 void supine_physics_resting_print(const supine_resting *resting, char *text, size_t size) {
-  size_t used = 0;
-  for (size_t axis = 0; axis < 6 && used < size; ++axis) {
-    used += (size_t)supine_print_text(text + used, size - used, "%s%s=%.4g/%.4g",
-                                      axis == 0 ? "" : ",", supine_physics_resting_names[axis],
-                                      resting->share[0][axis], resting->share[1][axis]);
+  text[0] = '\0';
+  for (size_t axis = 0; axis < 6; ++axis) {
+    supine_text_add(text, size, "%s%s=%.4g/%.4g", axis == 0 ? "" : ",",
+                    supine_physics_resting_names[axis], resting->share[0][axis],
+                    resting->share[1][axis]);
   }
 }
 

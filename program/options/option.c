@@ -97,13 +97,10 @@ static void describe_valid_values(const supine_option *option, char *text, size_
   if (option->wants != NULL) {
     (void)snprintf(text, size, "%s", option->wants);
   } else if (option->choices != NULL) {
-    size_t used = 0;
-    for (size_t i = 0; option->choices[i] != NULL && used < size; ++i) {
+    (void)snprintf(text, size, "%s", option->choices[0]);
+    for (size_t i = 1; option->choices[i] != NULL; ++i) {
       const char *before = option->choices[i + 1] == NULL ? " or " : ", ";
-      if (i == 0) {
-        before = "";
-      }
-      used += (size_t)snprintf(text + used, size - used, "%s%s", before, option->choices[i]);
+      supine_text_add(text, size, "%s%s", before, option->choices[i]);
     }
   } else if (option->range[1] > 0.0 && !option->open) {
     const char *units = supine_quantity_units(option->quantity);
@@ -341,9 +338,9 @@ static supine_status check_outputs(const reading *r, const supine_arguments *giv
 
 /* Write the command line into `text` [size]; shorten paths to the part after the last slash. */
 static void describe_command(int argc, char **argv, char *text, size_t size) {
-  size_t used = (size_t)snprintf(text, size, "supine " SUPINE_VERSION);
-  for (int i = 0; i < argc && used < size; ++i) {
-    used += (size_t)snprintf(text + used, size - used, " %s", supine_text_file_name(argv[i]));
+  (void)snprintf(text, size, "supine " SUPINE_VERSION);
+  for (int i = 0; i < argc; ++i) {
+    supine_text_add(text, size, " %s", supine_text_file_name(argv[i]));
   }
   (void)supine_text_make_utf8(text);
 }

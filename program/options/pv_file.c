@@ -10,6 +10,7 @@
 #include "base/csv.h"
 #include "base/locale.h"
 #include "base/number.h"
+#include "base/text.h"
 
 #include "program/options/pv.h"
 
@@ -118,9 +119,8 @@ supine_status supine_options_pv_load(const char *path, supine_pv *pv, supine_err
     if (limbs[limb] != NULL) {
       const supine_status status = read_curve(limbs[limb], &found.limb[limb], &wrong);
       if (status != SUPINE_OK) {
-        const size_t length = strlen(wrong.message);
-        (void)supine_print_text(wrong.message + length, sizeof wrong.message - length,
-                                ": make the file with 'supine pv fit'");
+        supine_text_add(wrong.message, sizeof wrong.message,
+                        ": make the file with 'supine pv fit'");
         wrong.status = SUPINE_ERROR_FORMAT;
         return supine_error_wrap(error, &wrong, "%s: %s: ", path, name);
       }
