@@ -157,8 +157,8 @@ static bool is_shell(const shown *m) {
   return m->mark->kind == SUPINE_MARK_ANATOMY;
 }
 
-/* Return what a name in `box` would hide: balls, rings and ghosts, names that were placed before it
- * and their lines, and what the line to its mark would cross. */
+/* Return what a name in `box` would hide: the heading, balls, rings and ghosts, names that were
+ * placed before it and their lines, and what the line to its mark would cross. */
 static double cost_of(const sketch *s, size_t own, const double box[4]) {
   const double gap = 0.15 * s->style->font;
   double end[2];
@@ -185,7 +185,8 @@ static double cost_of(const sketch *s, size_t own, const double box[4]) {
     }
   }
   const bool inside = box[0] >= 0.0 && box[2] <= s->width && box[1] >= 0.0 && box[3] <= s->height;
-  return cost + (inside ? 0.0 : 16.0);
+  const bool free = box[0] >= s->style->heading[0] || box[1] >= s->style->heading[1];
+  return cost + (inside && free ? 0.0 : 16.0);
 }
 
 /* Return the width of a name, with the square in its colour before that of a large structure. */

@@ -13,14 +13,15 @@ typedef struct marks_style {
   const double *faint;  /* [3] of the lines from names to their marks */
   const double *target; /* [3] of the ring around the selected target */
   double font;          /* size of the picture's letters, pixels */
+  double heading[2];    /* width and height of the upper left corner that words fill, pixels */
 } marks_style;
 
 /* Load cairo. Call this before the other functions. */
 supine_status supine_render_marks_load(supine_error *error);
 
 /* Draw the marks that have a label: a ring of the expected error and a dashed circle where it was
- * for the selected target, an arrow for each that moved, and all names. The origin is the upper left
- * corner of the scene. */
+ * for the selected target, an arrow for each that moved, and all names. The origin is the upper
+ * left corner of the scene. */
 supine_status supine_render_marks_draw(cairo_t *cr, const marks_style *style,
                                        const supine_basis *basis, const supine_scene *scene);
 

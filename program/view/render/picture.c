@@ -321,8 +321,15 @@ static supine_status lungs(const painter *by, const supine_panel *panel, supine_
     table(by, box, box[3] * table_at);
   }
   if (panel->marks != NULL) {
-    const marks_style style = {by->theme->card, by->theme->ink, by->theme->faint, by->theme->target,
-                               by->at.font};
+    const layout *at = &by->at;
+    const bool beside =
+        box[3] > at->cell_height - at->heading_height; /* the heading is in the box */
+    const marks_style style = {.ground = by->theme->card,
+                               .ink = by->theme->ink,
+                               .faint = by->theme->faint,
+                               .target = by->theme->target,
+                               .font = at->font,
+                               .heading = {beside ? box[2] / 2 : 0.0, at->heading_height}};
     scene.width = (size_t)box[2];
     scene.height = (size_t)box[3];
     cairo.translate(by->cr, floor(box[0]), floor(box[1]));
