@@ -294,9 +294,9 @@ def draw_between(given):
 
 
 def find_errors(package, basis, given, rows, fields):
-    """Return the RMS error of each vertex of a basis in states of a set, mm, as it is found and as it is stated, and
-    how many volumes the basis refuses."""
-    error, stated, refused = [], [], 0
+    """Return the fillings of the states of a set that a basis takes, and the squared error of each vertex in each of
+    these, mm2, as it is found and as it is stated."""
+    taken, error, stated = [], [], []
     order = [np.abs(given.points - x).sum(1).argmin() for x in basis.vertices]  # vertices are grouped by lung
     for row, u in zip(rows, fields):
         volume = {}
@@ -307,22 +307,24 @@ def find_errors(package, basis, given, rows, fields):
         try:
             pose = basis.pose(tuple(row[:3]), volume)
         except package.NumericalError:  # beyond the smallest or the largest volume of the directions of the basis
-            refused += 1
             continue
+        taken.append(row[3])
         error.append(basis.deform(pose) - (given.points + u)[order])
         stated.append(basis.expected_error(tuple(row[:3]), volume))
-    return np.sqrt((np.array(error) ** 2).sum(2).mean(0)), np.sqrt((np.array(stated) ** 2).mean(0)), refused
+    return np.array(taken), (np.array(error) ** 2).sum(2), np.array(stated) ** 2
 
 
 def stated_and_found(package, given):
     """Make bases of a set without each fifth of its directions. Return the number of warnings of all; then, for states
     between the runs and for the runs that were left out, their number, the volumes that the third basis refuses, the
     errors that it states and that are found, in parts of the RMS displacement, and for each vertex the stated error /
-    the found one: 5 %, median and 95 %; and stated / found of all five bases."""
+    the found one: 5 %, median and 95 %; stated / found of the states of one basis that are nearest to one volume of
+    the set, smallest and largest; and of all states of each of the five bases."""
     names = [tuple(row) for row in np.unique(given.plan[:, :3], axis=0)]
     fifth = np.array([names.index(tuple(row)) % 5 for row in given.plan[:, :3]])
     write_surface("set.ply", given.points, given.faces)
-    size, rms = np.sqrt((given.u ** 2).sum(2).mean()), lambda x: np.sqrt((x ** 2).mean())
+    size, rms = np.sqrt((given.u ** 2).sum(2).mean()), lambda square: np.sqrt(square.mean())
+    fills = np.unique(given.plan[:, 3])
     drawn, bases = draw_between(given), []
     between = drawn, [given.law(row) for row in drawn]
     with warnings.catch_warnings(record=True) as told:
@@ -333,15 +335,17 @@ def stated_and_found(package, given):
             bases.append((out, package.precompute("set.ply", fields="set.safetensors")))
     results = []
     for gap in (False, True):
-        ratios = []
+        ratios, volumes = [], []
         for left, (out, basis) in enumerate(bases):
             rows, fields = (given.plan[out], given.u[out]) if gap else between
-            found, stated, refused = find_errors(package, basis, given, rows, fields)
+            taken, found, stated = find_errors(package, basis, given, rows, fields)
             ratios.append(rms(stated) / rms(found))
+            nearest = np.abs(taken[:, None] - fills).argmin(1)
+            volumes += [rms(stated[nearest == k]) / rms(found[nearest == k]) for k in np.unique(nearest)]
             if left == 2:
-                result = (len(rows), refused, rms(stated) / size, rms(found) / size,
-                          *np.percentile(stated / found, (5, 50, 95)))
-        results.append((*result, *ratios))
+                result = (len(rows), len(rows) - len(taken), rms(stated) / size, rms(found) / size,
+                          *np.percentile(np.sqrt(stated.mean(0) / found.mean(0)), (5, 50, 95)))
+        results.append((*result, min(volumes), max(volumes), *ratios))
     return len(told), results
 
 
@@ -397,7 +401,8 @@ def measure_sets(package, build, paths):
                                                                    results):
             print(f"  {where}: {count} states, {refused} refused; stated {100 * stated:.4f} %, found "
                   f"{100 * found:.4f} %: {stated / found:.2f} times; of a vertex 5 % {ratios[0]:.2f}, median "
-                  f"{ratios[1]:.2f}, 95 % {ratios[2]:.2f}; of all bases", *(f"{ratio:.2f}" for ratio in ratios[3:]))
+                  f"{ratios[1]:.2f}, 95 % {ratios[2]:.2f}; at one volume of any basis {ratios[3]:.2f} to "
+                  f"{ratios[4]:.2f}; of all bases", *(f"{ratio:.2f}" for ratio in ratios[5:]))
         print("  smallest run {:.2f} and difference of two runs {:.3f} of the RMS; directions {:.0f} degrees apart; "
               "longest / shortest, rounded, {:.3f}".format(*distances(given)))
         print(f"{'':28} {'runs':>4} {'what is wrong':20} {'gravity, mm':>11} {'axes':>5} {'point':>6} {'run':>6} "
