@@ -407,7 +407,7 @@ class Basis:
         expected error, 95 % within 1.8 times. These errors were measured on full breaths in one posture; for a change
         of posture they are extrapolated. On another day than that of the scan, positions have the error
         `another_day`. Of another simulator's fields, it is the error of the fit to the simulator, which is
-        larger in gaps between its directions of gravity."""
+        larger in gaps between its directions of gravity, and depends on the volume."""
         return self._expected(self._judge(_state(state, volume)), None if since is None else self._judge(_state(since)))
 
     def _expected(self, wanted: Any, origin: Any) -> Floats:
