@@ -381,8 +381,9 @@ static void move_aside(const double box[4], double extent[4]) {
 }
 
 /* Draw the cell of the picture that shows the posture `column` from the view `row`. Shells touch
- * each other, and gravity points down in them if they are seen as the patient lies; in wide cells
- * the lungs are beside the heading. Values have cards, with a ball that shows gravity. */
+ * each other, and gravity points down in them if they are seen as the patient lies; in cells that
+ * are wide enough, the lungs are beside the heading. Values have cards, with a ball that shows
+ * gravity. */
 static supine_status cell(const painter *by, size_t column, size_t row, const double extent[4],
                           supine_error *error) {
   const layout *at = &by->at;
@@ -396,10 +397,12 @@ static supine_status cell(const painter *by, size_t column, size_t row, const do
   const double radius = at->heading_height * 0.4;
   const bool ball_shown = !shell || view != SUPINE_VIEW_LYING;
   const double words = x + at->font + (ball_shown ? 2 * radius + 0.5 * at->font : 0.0);
-  const bool wide = shell && at->cell_width > at->cell_height;
+  const double high = at->cell_height - 0.5 * at->font;
+  const double across = high * (extent[1] - extent[0]) / (extent[3] - extent[2]); /* of the lungs */
+  const bool wide = shell && across < 0.6 * at->cell_width;
   const double room = x + (wide ? 0.5 : 1.0) * at->cell_width - words - 0.5 * at->font;
   const double side = shell ? 0.0 : 0.5 * at->font; /* space beside and below the lungs */
-  const double above = wide ? 0.5 * at->font : at->heading_height;
+  const double above = wide ? at->cell_height - high : at->heading_height;
   const double box[4] = {x + side, y + above, at->cell_width - 2 * side,
                          at->cell_height - above - side};
   double shown[4] = {extent[0], extent[1], extent[2], extent[3]};
