@@ -438,10 +438,7 @@ static supine_status tidy_binary_stl(mesh_file *file, supine_error *error) {
     return SUPINE_OK;
   }
   const size_t room = (file->size - HEADER) / TRIANGLE;
-  uint64_t count = 0;
-  for (size_t k = 4; k-- > 0;) {
-    count = count << 8 | file->bytes[COUNT + k];
-  }
+  const uint64_t count = supine_io_little_endian(file->bytes + COUNT, 4);
   if (count == 0 && room * TRIANGLE == file->size - HEADER) {
     for (size_t k = 0; k < 4; ++k) {
       file->bytes[COUNT + k] = (unsigned char)(room >> 8 * k);
@@ -530,9 +527,8 @@ supine_status supine_io_read_stl(mesh_file *file, supine_mesh *mesh, size_t *dro
   return supine_io_import(file, mesh, dropped, error);
 }
 
-/* Refuse a text that holds more or fewer of something than it counts: importers lose the rest. */
-static supine_status compare_counts(const char *path, uint64_t counted, uint64_t held,
-                                    const char *what, supine_error *error) {
+supine_status supine_io_compare_counts(const char *path, uint64_t counted, uint64_t held,
+                                       const char *what, supine_error *error) {
   SUPINE_REFUSE_IF(counted != held, error, SUPINE_ERROR_FORMAT,
                    "%s: it counts %" PRIu64 " %s, but it holds %" PRIu64
                    ": save it again, so that no part of the surface is lost",
@@ -575,8 +571,8 @@ supine_status supine_io_read_off(mesh_file *file, supine_mesh *mesh, size_t *dro
   while (next_off_line(&text, &line)) {
     ++lines;
   }
-  SUPINE_TRY(compare_counts(file->path, counts[0] + counts[1], lines, "lines of vertices and faces",
-                            error));
+  SUPINE_TRY(supine_io_compare_counts(file->path, counts[0] + counts[1], lines,
+                                      "lines of vertices and faces", error));
   return supine_io_import(file, mesh, dropped, error);
 }
 
@@ -600,7 +596,7 @@ supine_status supine_io_read_ac(mesh_file *file, supine_mesh *mesh, size_t *drop
       counted += count;
     }
   }
-  SUPINE_TRY(compare_counts(file->path, counted, held, "surfaces", error));
+  SUPINE_TRY(supine_io_compare_counts(file->path, counted, held, "surfaces", error));
   return supine_io_import(file, mesh, dropped, error);
 }
 

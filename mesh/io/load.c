@@ -9,7 +9,6 @@
 #include "base/arena.h"
 #include "base/ascii.h"
 #include "base/input.h"
-#include "base/number.h"
 #include "base/remedy.h"
 #include "base/text.h"
 
@@ -19,9 +18,10 @@ static mesh_reader *find_reader(const char *path) {
   static const struct {
     const char *ending;
     mesh_reader *read;
-  } known[] = {{".ply", supine_io_read_ply}, {".vtp", supine_io_read_vtp},
-               {".stl", supine_io_read_stl}, {".obj", supine_io_read_obj},
-               {".off", supine_io_read_off}, {".ac", supine_io_read_ac}};
+  } known[] = {{".ply", supine_io_read_ply},   {".vtp", supine_io_read_vtp},
+               {".stl", supine_io_read_stl},   {".obj", supine_io_read_obj},
+               {".off", supine_io_read_off},   {".ac", supine_io_read_ac},
+               {".gltf", supine_io_read_gltf}, {".glb", supine_io_read_gltf}};
   for (size_t i = 0; i < sizeof known / sizeof *known; ++i) {
     if (supine_text_ends_in(path, known[i].ending)) {
       return known[i].read;
@@ -56,45 +56,6 @@ static void find_space(mesh_file *file) {
   }
 }
 
-/* Copy the value of an attribute of the first element `tag` of a file; "" if it has none. */
-static void find_attribute(const mesh_file *file, const char *tag, const char *name,
-                           char value[32]) {
-  const char *text = (const char *)file->bytes;
-  mesh_element element;
-  if (!supine_io_element_find(text, text + file->size, tag, &element) ||
-      !supine_io_element_attribute(&element, name, value, 32)) {
-    value[0] = '\0';
-  }
-}
-
-/* Find the unit that the file states: AMF names it, and assimp converts COLLADA to metres where it
- * states another unit. Without one, `millimetres` stays 0. */
-static supine_status find_unit(mesh_file *file, supine_error *error) {
-  static const struct {
-    const char *name;
-    double millimetres;
-  } names[] = {
-      {"millimeter", 1.0}, {"inch", 25.4}, {"feet", 304.8}, {"meter", 1000.0}, {"micron", 1e-3}};
-  char text[32];
-  char *end = NULL;
-  if (supine_text_ends_in(file->path, ".dae")) {
-    find_attribute(file, "unit", "meter", text);
-    const double metres = supine_number_parse(text, &end);
-    file->millimetres = end != text && metres > 0.0 && metres != 1.0 ? 1000.0 : 0.0;
-  } else if (supine_text_ends_in(file->path, ".amf")) {
-    find_attribute(file, "amf", "unit", text);
-    for (size_t i = 0; i < sizeof names / sizeof *names; ++i) {
-      if (supine_ascii_same(text, names[i].name)) {
-        file->millimetres = names[i].millimetres;
-      }
-    }
-    SUPINE_REFUSE_IF(text[0] != '\0' && file->millimetres == 0.0, error, SUPINE_ERROR_FORMAT,
-                     "%s: the unit \"%s\" is unknown; save the mesh in millimeter", file->path,
-                     text);
-  }
-  return SUPINE_OK;
-}
-
 static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader **reader,
                                supine_error *error) {
   size_t size = 0;
@@ -110,7 +71,7 @@ static supine_status read_file(mesh_file *file, supine_arena *arena, mesh_reader
   SUPINE_REFUSE_IF(ferror(stream) != 0, error, SUPINE_ERROR_READ, "%s: cannot read: %s", file->path,
                    strerror(errno == 0 ? EIO : errno));
   find_space(file);
-  SUPINE_TRY(find_unit(file, error));
+  SUPINE_TRY(supine_io_find_unit(file, error));
   *reader = find_reader(file->path);
   SUPINE_REFUSE_IF(*reader == NULL && supine_text_ends_in(file->path, ".vtk"), error,
                    SUPINE_ERROR_FORMAT,

@@ -45,6 +45,9 @@ const mesh_type *supine_io_type_find(mesh_text name);
 /** Convert the bytes of a number to double. */
 double supine_io_type_decode(const mesh_type *type, const unsigned char *bytes, bool big_endian);
 
+/** Return the unsigned integer of at most four bytes, the least significant first. */
+size_t supine_io_little_endian(const unsigned char *at, size_t bytes);
+
 /* ---- xml.c: find elements and attributes in the text of an XML file, which a NUL follows. ---- */
 
 typedef struct mesh_element {
@@ -73,6 +76,16 @@ typedef struct mesh_file {
  * lines differently. */
 supine_status supine_io_guard_text(const mesh_file *file, supine_error *error);
 
+/** Refuse a file that holds more or fewer of something than it counts: importers lose the rest. */
+supine_status supine_io_compare_counts(const char *path, uint64_t counted, uint64_t held,
+                                       const char *what, supine_error *error);
+
+/* ---- units.c ---- */
+
+/** Find the unit that the file states: AMF and 3MF name it, X3D states it in metres, and assimp
+ * converts COLLADA to metres where it states another unit. Without one, `millimetres` stays 0. */
+supine_status supine_io_find_unit(mesh_file *file, supine_error *error);
+
 /* ---- faces.c: add faces to a mesh that already has its vertices. ---- */
 
 enum {
@@ -94,7 +107,7 @@ typedef struct mesh_faces {
 supine_status supine_io_faces_add(mesh_faces *faces, const double *corners, size_t count,
                                   supine_error *error);
 
-/* ---- ply.c, vtp_read.c, import.c: one function for each format. ---- */
+/* ---- ply.c, vtp_read.c, gltf.c, import.c: one function for each format. ---- */
 
 /** Read a surface in the file's units and axes, in single precision, without welding its vertices.
  * The caller frees `mesh`, even after a failure. `dropped` is set to the number of faces that are
@@ -107,6 +120,7 @@ mesh_reader supine_io_read_stl;
 mesh_reader supine_io_read_obj;
 mesh_reader supine_io_read_off;
 mesh_reader supine_io_read_ac;
+mesh_reader supine_io_read_gltf;
 /** Read any other format with the library assimp. */
 mesh_reader supine_io_import;
 /** Return whether assimp is installed and imports files whose names have this ending. */

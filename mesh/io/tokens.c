@@ -119,3 +119,11 @@ supine_status supine_io_guard_text(const mesh_file *file, supine_error *error) {
   }
   return SUPINE_OK;
 }
+
+size_t supine_io_little_endian(const unsigned char *at, size_t bytes) {
+  size_t number = 0;
+  while (bytes-- > 0) {
+    number = number << 8 | at[bytes];
+  }
+  return number;
+}

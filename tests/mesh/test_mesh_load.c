@@ -242,6 +242,28 @@ TEST(test_load_amf_unit_of_the_file_used) {
   refuse_text(state, "u.amf", AMF(" unit=\"ell\""), SUPINE_ERROR_FORMAT, "unit \"ell\" is unknown");
 }
 
+#define X3D(units)                                                                                 \
+  "<X3D version=\"3.3\"><head>" units "</head><Scene><Shape><IndexedFaceSet coordIndex=\"0 1 2 "   \
+  "-1\"><Coordinate point=\"1 0 0 0 2 0 0 0 3\"/></IndexedFaceSet></Shape></Scene></X3D>"
+
+TEST(test_load_x3d_unit_of_length_used) {
+  static const struct {
+    const char *text;
+    double millimetres;
+  } files[] = {{X3D(""), 1.0},
+               {X3D("<unit category=\"length\" conversionFactor=\"0.01\" name=\"cm\"/>"), 10.0},
+               {X3D("<unit category='angle' conversionFactor='2' name='a'/>"
+                    "<unit category='length' conversionFactor='0.001' name='mm'/>"),
+                1.0},
+               {X3D("<unit category='mass' conversionFactor='0.001' name='g'/>"), 1.0}};
+  char path[256];
+  for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
+    supine_mesh mesh = load(sample_text(state, "u.x3d", files[i].text, path), NULL, NULL);
+    assert_true(fabs(mesh.vertices[4] - 2.0 * files[i].millimetres) < 1e-12);
+    supine_mesh_free(&mesh);
+  }
+}
+
 TEST(test_load_legacy_vtk_conversion_named) {
   refuse_text(state, "old.vtk", "# vtk DataFile Version 4.2\n", SUPINE_ERROR_FORMAT,
               "save the surface as .vtp or .ply");
@@ -665,6 +687,64 @@ static const char *gltf_numbers(void **state, const char *name, char path[256]) 
   memcpy(bytes, vertices, sizeof vertices);
   memcpy(bytes + 48, corners, sizeof corners);
   return sample_write(state, name, bytes, sizeof bytes, path);
+}
+
+/* Replace the first `from` in the file of gltf_naming by `to`. Return its path. */
+static const char *gltf_with(void **state, const char *from, const char *to, char path[256]) {
+  char text[2048];
+  char made[2560];
+  FILE *file = fopen(gltf_naming(state, "n.bin", path), "rb");
+  assert_non_null(file);
+  text[fread(text, 1, sizeof text - 1, file)] = '\0';
+  assert_int_equal(fclose(file), 0);
+  const char *at = strstr(text, from);
+  assert_non_null(at);
+  (void)snprintf(made, sizeof made, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+  return sample_text(state, "a.gltf", made, path);
+}
+
+/* assimp reads such files, but takes negative offsets for 0, reads numbers of another accessor, and
+ * loses triangles. */
+TEST(test_load_gltf_numbers_elsewhere_than_stated_refused) {
+  static const struct {
+    const char *from, *to, *words;
+  } changed[] = {
+      {"\"count\":4", "\"count\":3", "it counts 3 positions, but it holds 4"},
+      {"\"count\":4", "\"count\":5", "it counts 5 positions, but it holds 4"},
+      {"\"count\":4", "\"count\":-4", "impossible"},
+      {"\"count\":4", "\"count\":1e300", "impossible"},
+      {"\"count\":12", "\"count\":9", "it counts 9 corners, but it holds 12"},
+      {"\"count\":12", "\"count\":11", "11 corners, which is no multiple of three"},
+      {"\"count\":4", "\"byteOffset\":-12,\"count\":4", "impossible"},
+      {"\"count\":4", "\"byteOffset\":12,\"count\":4", "counts 4 positions, but it holds 3"},
+      {"\"byteOffset\":0", "\"byteOffset\":-12", "impossible"},
+      {"\"byteOffset\":0", "\"byteOffset\":0,\"byteStride\":4", "impossible"},
+      {"\"byteLength\":48", "\"byteLength\":36", "counts 4 positions, but it holds 3"},
+      {"\"byteLength\":48", "\"byteLength\":72", "counts 4 positions, but it holds 6"},
+      {"\"componentType\":5123", "\"componentType\":5121", "counts 12 corners, but it holds 24"},
+      {"\"componentType\":5126", "\"componentType\":5123", "not three numbers of single precision"},
+      {"VEC3", "VEC2", "not three numbers of single precision"}};
+  char numbers[256];
+  char path[256];
+  (void)gltf_numbers(state, "n.bin", numbers);
+  for (size_t i = 0; i < sizeof changed / sizeof *changed; ++i) {
+    expect_refused(gltf_with(state, changed[i].from, changed[i].to, path), NULL,
+                   SUPINE_ERROR_FORMAT, changed[i].words);
+  }
+  /* a view that is padded, and one that two accessors read */
+  static const char *const right[][2] = {
+      {"\"byteLength\":48", "\"byteLength\":50"},
+      {"{\"bufferView\":1,\"componentType\":5123,\"count\":12,\"type\":\"SCALAR\"}],"
+       "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":48}",
+       "{\"bufferView\":0,\"byteOffset\":48,\"componentType\":5123,\"count\":12,\"type\":"
+       "\"SCALAR\"}],"
+       "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":72}"}};
+  for (size_t i = 0; i < sizeof right / sizeof *right; ++i) {
+    supine_mesh mesh = load(gltf_with(state, right[i][0], right[i][1], path), NULL, NULL);
+    expect_tetrahedron(&mesh);
+    supine_mesh_free(&mesh);
+  }
+  assert_int_equal(unlink(numbers), 0);
 }
 
 TEST(test_load_gltf_file_in_same_folder_read) {

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 
 try:
     import nibabel
@@ -156,6 +157,49 @@ if vtk:
                     run(supine, "solve", "v.vtp", "--posture", "prone", "-o", "v.ply")
                     if not os.path.exists("v.ply") or open("v.ply", "rb").read() != open("wanted.ply", "rb").read():
                         faults.append(f"VTK's VTP, mode {mode}, header {header}, packed {packed}, encoded {encoded}")
+
+# supine reads a 3MF file in the unit that it states.
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+TARGET = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+RELATIONSHIPS = "http://schemas.openxmlformats.org/package/2006/relationships"
+
+
+def read_obj(path):
+    """Return the vertices and the triangles, counted from 1."""
+    rows = [line.split() for line in open(path, encoding="utf-8")]
+    return [numpy.array([row[1:4] for row in rows if row and row[0] == kind], float) for kind in ("v", "f")]
+
+
+def write_3mf(path, vertices, triangles, unit, method, model="3D/3dmodel.model"):
+    """Write a surface in a unit of the format ('' to state none)."""
+    corners = "".join('<vertex x="%.9g" y="%.9g" z="%.9g"/>' % tuple(row) for row in vertices)
+    faces = "".join('<triangle v1="%d" v2="%d" v3="%d"/>' % tuple(row - 1) for row in triangles)
+    stated = f'unit="{unit}"' if unit else ""
+    with zipfile.ZipFile(path, "w", method) as file:
+        file.writestr("_rels/.rels", f'<Relationships xmlns="{RELATIONSHIPS}"><Relationship Id="r" Type="{TARGET}" '
+                                     f'Target="/{model}"/></Relationships>')
+        file.writestr(model, f'<?xml version="1.0"?><model {stated} xmlns="{CORE}"><resources><object id="1" '
+                             f'type="model"><mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh>'
+                             '</object></resources><build><item objectid="1"/></build></model>')
+
+
+run(supine, "deform", "l.safetensors", "--posture", "prone", "-o", "in.obj")
+run(supine, "solve", "in.obj", "--posture", "prone", "-o", "wanted.obj")
+surface = read_obj("in.obj")
+for unit, millimetres, method in (("", 1, 0), ("millimeter", 1, 8), ("inch", 25.4, 8), ("centimeter", 10, 0),
+                                  ("foot", 304.8, 8)):
+    write_3mf("in.3mf", surface[0] / millimetres, surface[1], unit, method)
+    run(supine, "solve", "in.3mf", "--posture", "prone", "-o", "got.obj")
+    boxes = [[vertices.min(0), vertices.max(0), vertices.mean(0)]  # assimp numbers the vertices of OBJ anew
+             for vertices, _ in map(read_obj, ("got.obj", "wanted.obj"))]
+    close(f"3MF in '{unit}'", *boxes, 0.01)
+for words, unit, model in (('the unit "ell" is unknown', "ell", "3D/3dmodel.model"),
+                           ("no readable model", "inch", "3D/other.model")):
+    write_3mf("in.3mf", *surface, unit, 8, model)
+    refused = subprocess.run([supine, "solve", "in.3mf", "--posture", "prone", "-o", "got.obj"], capture_output=True,
+                             text=True, check=False)
+    if refused.returncode != 2 or "in.3mf: " not in refused.stderr or words not in refused.stderr:
+        faults.append(f"3MF, {words}: {refused}")
 
 # supine reads a folder of TotalSegmentator masks, writes to a pipe, and accepts a file name that is not UTF-8.
 os.mkdir("segmentations")
