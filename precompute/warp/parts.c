@@ -40,11 +40,11 @@ static bool has_stage(unsigned char voxel, unsigned stage) {
   return (voxel & SUPINE_TISSUE_STAGE) == stage;
 }
 
-/* The offsets from a voxel to those within a distance of it. */
+/* The voxels within a distance of a voxel. */
 typedef struct ball {
   size_t count;
-  int (*by)[3];
-  size_t reach[3]; /* largest offset along each axis */
+  ptrdiff_t *by;   /* [count] from the index of the voxel to theirs */
+  size_t reach[3]; /* largest distance along each axis, voxels */
 } ball;
 
 static bool ball_create(const supine_image *frame, double radius, supine_arena *arena, ball *made) {
@@ -61,43 +61,49 @@ static bool ball_create(const supine_image *frame, double radius, supine_arena *
   for (size_t code = 0; code < most; ++code) {
     size_t rest = code;
     double step[3] = {0.0, 0.0, 0.0};
-    int by[3];
+    ptrdiff_t stride = 1;
+    ptrdiff_t by = 0;
     for (size_t a = 0; a < 3; ++a) {
-      by[a] = (int)(rest % (2 * made->reach[a] + 1)) - (int)made->reach[a];
+      const ptrdiff_t along =
+          (ptrdiff_t)(rest % (2 * made->reach[a] + 1)) - (ptrdiff_t)made->reach[a];
       rest /= 2 * made->reach[a] + 1;
+      by += stride * along;
+      stride *= (ptrdiff_t)frame->size[a];
       for (size_t k = 0; k < 3; ++k) {
-        step[k] += by[a] * frame->step[a][k];
+        step[k] += (double)along * frame->step[a][k];
       }
     }
     if (supine_length(step) <= radius) {
-      memcpy(made->by[made->count++], by, sizeof by);
+      made->by[made->count++] = by;
     }
   }
   return true;
 }
 
-/* Mark the voxels `at` around which a ball is soft; with `open`, mark the soft voxels of the ball.
- * Outside the image, nothing is soft. */
-static bool ball_visit(const search *s, const ball *b, const size_t at[3], bool open) {
+/* Return whether a ball around the voxel `at` is soft. Outside the image, nothing is. */
+static bool is_soft_around(const search *s, const ball *b, const size_t at[3]) {
   const size_t *size = s->frame->size;
   for (size_t a = 0; a < 3; ++a) {
     if (at[a] < b->reach[a] || at[a] + b->reach[a] >= size[a]) {
       return false;
     }
   }
-  const ptrdiff_t row = (ptrdiff_t)size[0];
-  const ptrdiff_t slice = row * (ptrdiff_t)size[1];
-  unsigned char *here = s->stage + at[0] + size[0] * (at[1] + size[1] * at[2]);
+  const unsigned char *here = s->stage + at[0] + size[0] * (at[1] + size[1] * at[2]);
   for (size_t i = 0; i < b->count; ++i) {
-    unsigned char *other = here + b->by[i][0] + row * b->by[i][1] + slice * b->by[i][2];
-    if (!open && has_stage(*other, 0)) {
+    if (has_stage(here[b->by[i]], 0)) {
       return false;
-    }
-    if (open && has_stage(*other, SUPINE_TISSUE_SOFT)) {
-      set_stage(other, SUPINE_TISSUE_OPEN);
     }
   }
   return true;
+}
+
+/* Mark the soft voxels of a ball around the voxel `centre`. */
+static void open_ball(const ball *b, unsigned char *centre) {
+  for (size_t i = 0; i < b->count; ++i) {
+    if (has_stage(centre[b->by[i]], SUPINE_TISSUE_SOFT)) {
+      set_stage(centre + b->by[i], SUPINE_TISSUE_OPEN);
+    }
+  }
 }
 
 /* Open the soft voxels by a ball: keep those that are in a ball of soft voxels. */
@@ -109,17 +115,20 @@ static supine_status open_by_ball(const search *s, supine_error *error) {
   }
   const size_t *size = s->frame->size;
   const size_t rows = size[1] * size[2];
-  for (size_t row = 0; row < 2 * rows; ++row) { /* twice: to find the balls, and what is in them */
-    const bool open = row >= rows;
-    const unsigned wanted = open ? SUPINE_TISSUE_CORE : SUPINE_TISSUE_SOFT;
-    const supine_warp_span *span = &s->span[row % rows];
-    unsigned char *stage = s->stage + size[0] * (row % rows);
-    for (size_t i = span->begin; i < span->end; ++i) {
-      if (has_stage(stage[i], wanted)) {
-        const size_t at[3] = {i, row % size[1], row % rows / size[1]};
-        if (ball_visit(s, &b, at, open) && !open) {
-          set_stage(&stage[i], SUPINE_TISSUE_CORE);
-        }
+  for (size_t row = 0; row < rows; ++row) { /* find the centres of the balls */
+    unsigned char *stage = s->stage + size[0] * row;
+    for (size_t i = s->span[row].begin; i < s->span[row].end; ++i) {
+      const size_t at[3] = {i, row % size[1], row / size[1]};
+      if (has_stage(stage[i], SUPINE_TISSUE_SOFT) && is_soft_around(s, &b, at)) {
+        set_stage(&stage[i], SUPINE_TISSUE_CORE);
+      }
+    }
+  }
+  for (size_t row = 0; row < rows; ++row) { /* mark what is in them */
+    unsigned char *stage = s->stage + size[0] * row;
+    for (size_t i = s->span[row].begin; i < s->span[row].end; ++i) {
+      if (has_stage(stage[i], SUPINE_TISSUE_CORE)) {
+        open_ball(&b, stage + i);
       }
     }
   }
