@@ -7,14 +7,19 @@ Start the server:
 
 then, in Slicer's Python console:
 
-    import sys; sys.path += ["/path/to/examples/slicer", "/path/to/examples/tracker"]
+    import sys; sys.path.append("/path/to/examples/slicer")
     from slicer_lung import Follow
     follow = Follow("PatientToRoom")   # a linear transform node with the patient's orientation
     follow.stop()
 
 Slicer's axes are right, front, head (RAS). The identity transform means a patient who lies on the
 back; gravity points along -y of the room."""
-from supine_link import Link, corners, unpack
+import os
+import sys
+
+# In an extension, supine_link.py is beside this file.
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "tracker"))
+from supine_link import Link, corners, unpack  # noqa: E402
 
 SERVER_OPTIONS = ["--send", "points", "--space", "ras", "--world-down", "0,-1,0",
                   "--body-from-tracker", "0,0,0,1"]

@@ -2,8 +2,7 @@
 """A scripted module for 3D Slicer: lungs that deform with the orientation of a linear transform node.
 
 Add this folder to "Additional module paths" in Slicer's settings, or build it with CMakeLists.txt as part of an
-extension. It needs slicer_lung.py, which has the command of the server, from the folder above or beside this file, and
-supine_link.py, from examples/tracker or beside this file."""
+extension. It needs slicer_lung.py, which has the command of the server, from the folder above or beside this file."""
 import os
 import sys
 
@@ -12,7 +11,7 @@ import slicer
 from slicer.ScriptedLoadableModule import ScriptedLoadableModule, ScriptedLoadableModuleWidget
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path += [HERE, os.path.dirname(HERE), os.path.join(HERE, "..", "..", "tracker")]
+sys.path += [HERE, os.path.dirname(HERE)]
 from slicer_lung import Follow  # noqa: E402
 
 

@@ -14,7 +14,7 @@ from slicer.ScriptedLoadableModule import (ScriptedLoadableModule, ScriptedLoada
                                            ScriptedLoadableModuleTest, ScriptedLoadableModuleWidget)
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path += [HERE, os.path.dirname(HERE), os.path.join(HERE, "..", "..", "tracker")]
+sys.path += [HERE, os.path.dirname(HERE)]
 from slicer_lung import show_points  # noqa: E402
 
 INSTALL = "Install the Python package: slicer.util.pip_install('supine-....whl'), and the program supine on PATH"
