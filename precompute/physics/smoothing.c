@@ -89,9 +89,8 @@ static void set_weights(supine_smoothing *s, const supine_mesh *mesh, double rea
   }
 }
 
-void supine_physics_smoothing_set_shape(supine_smoothing *smoothing, const supine_mesh *mesh,
+void supine_physics_smoothing_set_shape(supine_smoothing *s, const supine_mesh *mesh,
                                         double reach) {
-  supine_smoothing *s = smoothing;
   set_weights(s, mesh, reach);
   memcpy(s->diagonal, s->area, s->vertex_count * sizeof *s->diagonal);
   for (size_t e = 0; e < s->topology->edge_count; ++e) {

@@ -105,6 +105,9 @@ static supine_status find_errors(const supine_basis *basis, const request *wante
     SUPINE_TRY(supine_options_hilum_expected(basis, &moved->state, &moved->from.state,
                                              &errors->moved, error));
   }
+  if (supine_basis_get_info(basis)->is_fields) {
+    SUPINE_TRY(supine_posed_simulator_error(basis, &moved->state, &errors->position, error));
+  }
   return SUPINE_OK;
 }
 
@@ -116,14 +119,12 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
                               .allow_folds = wanted->volume.allow_folds,
                               .subtract_hilum = wanted->frame.hilum,
                               .registered = wanted->frame.points != NULL};
-  static const char simulator[] = "expected_error_mm: of the fit to the other simulator; ";
-  const char *by = "";
   char comment[384 + SUPINE_CAVEATS_SIZE];
   char caveats[SUPINE_CAVEATS_SIZE];
   SUPINE_TRY(supine_options_reference(basis, name, &wanted->from, false, &moved.from, error));
   SUPINE_TRY(supine_options_pose(basis, name, &moved.state, &moved.pose, error));
   supine_options_tell_state(name, basis, &moved.state, &moved.pose);
-  if (wanted->sample_given) { /* one of many lungs: what is expected of the prediction is not its */
+  if (wanted->sample_given) { /* the expected error of the prediction is not that of a sample */
     const size_t n = supine_basis_get_info(basis)->vertex_count;
     moved.deviation = supine_arena_take(&arena, 3 * n, sizeof *moved.deviation);
     SUPINE_TRY(supine_arena_check(&arena, error, "%zu vertices", n));
@@ -132,16 +133,15 @@ static supine_status deform(const supine_basis *basis, const request *wanted, su
   } else {
     SUPINE_TRY(find_errors(basis, wanted, &moved, &errors, error));
   }
-  if (supine_basis_get_info(basis)->is_fields && !wanted->sample_given) {
-    SUPINE_TRY(supine_posed_simulator_error(basis, &moved.state, &errors.position, error));
-    by = errors.position.sigma == NULL ? "" : simulator;
-  }
+  const bool simulated = supine_basis_get_info(basis)->is_fields && errors.position.sigma != NULL;
   moved.errors = errors;
   (void)supine_basis_caveats(basis, caveats, sizeof caveats);
   supine_options_next_result();
   SUPINE_ADD_RESULT(json_pack("{s:s}", "caveats", caveats));
   (void)snprintf(comment, sizeof comment, "displacement from %s%s; %s%s", moved.from.name,
-                 frame_of(&wanted->frame), by, caveats);
+                 frame_of(&wanted->frame),
+                 simulated ? "expected_error_mm: of the fit to the other simulator; " : "",
+                 caveats);
   moved.save.comment = comment;
   SUPINE_TRY(supine_options_basis_frame(basis, wanted->as_scanned, &moved.save, error));
   return supine_command_deform_content(&wanted->content, basis, &moved, error);

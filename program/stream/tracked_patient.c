@@ -160,10 +160,13 @@ static bool store_position(supine_stream_patient *p, const char *name, const dou
                            double received, uint64_t stamp) {
   supine_stream_observed *observed = p->options->observed;
   size_t at = 0;
-  while (observed != NULL && at < observed->count && strcmp(observed->name[at], name) != 0) {
+  if (observed == NULL) {
+    return false;
+  }
+  while (at < observed->count && strcmp(observed->name[at], name) != 0) {
     ++at;
   }
-  if (observed == NULL || at == observed->count) {
+  if (at == observed->count) {
     return false;
   }
   for (size_t i = 0; i < 3; ++i) {
