@@ -159,9 +159,9 @@ def compare_numbers(name, commands, rounds, number):
     print(f"{name:28} {best[0]:8.4f} {best[1]:8.4f} {best[1] / best[0]:6.2f}", flush=True)
 
 
-def write_inputs(programs, vertices):
-    """Write the inputs of all commands to the folders 0 and 1 of the programs. They share the files that the first
-    program makes, but not the bases."""
+def write_inputs(programs, vertices, rows):
+    """Write the inputs of the commands in `rows` to the folders 0 and 1 of the programs. They share the files that the
+    first program makes, but not the bases."""
     def make(which, *arguments):
         subprocess.run([programs[which], *arguments], check=True, stdout=subprocess.DEVNULL, cwd=str(which))
 
@@ -174,10 +174,11 @@ def write_inputs(programs, vertices):
             file.write("posture,volume,output\n")
             for posture in ("prone", "supine", "left", "right")[:count]:
                 file.write(f"{posture},rest,{posture}.nii\n")
-    write_image("0/image.nii", False)
-    with open("0/image.nii", "rb") as image, gzip.open("0/packed.nii.gz", "wb", compresslevel=1) as packed:
-        shutil.copyfileobj(image, packed, 1 << 20)
-    write_image("0/labels.nii", True)
+    if any("grid.safetensors" in arguments for _, arguments, _ in rows):
+        write_image("0/image.nii", False)
+        with open("0/image.nii", "rb") as image, gzip.open("0/packed.nii.gz", "wb", compresslevel=1) as packed:
+            shutil.copyfileobj(image, packed, 1 << 20)
+        write_image("0/labels.nii", True)
     with open("0/points.csv", "w", encoding="ascii") as file:
         file.write("x,y,z\n")
         for i in range(20000):  # each point is in the left lung
@@ -262,7 +263,8 @@ def main():
     with tempfile.TemporaryDirectory(dir=chosen.folder) as folder:
         os.chdir(folder)
 
-        write_inputs(programs, chosen.vertices)
+        rows = [row for row in ROWS if chosen.only in row[0]]
+        write_inputs(programs, chosen.vertices, rows)
 
         print(f"{'':28} {'wall, s':^24}   {'processors, s':^24}   {'memory, MB':^22}")
         print(f"{'':28}" + 3 * f" {'old':>8} {'new':>8} {'ratio':>6}  ")
@@ -274,10 +276,9 @@ def main():
                              for which, program in enumerate(programs)], chosen.rounds,
                             lambda said: float(said.splitlines()[1].split()[5]))
         seconds = {}
-        for name, arguments, output in ROWS:
-            if chosen.only in name:
-                rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
-                seconds[name] = compare(name, programs, arguments, rounds, output)
+        for name, arguments, output in rows:
+            rounds = 20 * chosen.rounds if name == "--help" else chosen.rounds
+            seconds[name] = compare(name, programs, arguments, rounds, output)
         shells, coloured = [seconds.get(name) for name in ("render, 20 panels", "render, 20 coloured panels")]
         if shells and coloured:
             ratios = [f"{shell / other:.2f}" for shell, other in zip(shells, coloured)]
