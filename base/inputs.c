@@ -266,8 +266,8 @@ static const supine_input inputs[] = {
     .people = 7, .n = 12,
     .interfaces = OFFLINE},
   [SUPINE_INPUT_PATIENT_VOLUME] = {
-    .name = TEXT("patient-volume"), .group = TEXT("Landmarks"), .input = TEXT("a patient's file and lungs, or a scan and a state with a volume in mL"),
-    .against = TEXT("the scan that was fitted, or that of the state"), .measured = TEXT("ratio of volumes"),
+    .name = TEXT("patient-volume"), .group = TEXT("Landmarks"), .input = TEXT("a patient's file and lungs, or their given state, or a scan and a state with a volume in mL"),
+    .against = TEXT("the scan that was fitted, or that of the state"), .measured = TEXT("ratio of volumes, of a given state at full inflation"),
     .told = 1.1, .refused = NAN, .evidence = TEXT("the same scan, surfaces of 3 and 8 mm edge: 1.000; the margin is assumed"),
     .people = 7, .n = 12,
     .interfaces = OFFLINE},

@@ -147,6 +147,10 @@ static supine_status choose_model(const supine_precompute_options *options,
       known->has_scan = true;
       known->scan = fitted;
       SUPINE_TRY(assume_fitted_state(p->patient, &fitted, &p->source.findings, error));
+    } else if (known->scan.known && fitted.known) {
+      const double *held = p->source.lungs.volume;
+      supine_patient_check_state(&known->scan.state, &fitted.state, held[0] + held[1],
+                                 &known->resting, &p->source.findings);
     }
     return SUPINE_OK;
   }

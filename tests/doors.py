@@ -243,6 +243,8 @@ MISTAKES = {
     "patient": (write_text, ".json", {
         RIGHT: patient, "person": other_patient, "range": patient.replace(first_number, "1e30", 1),
         "finite": patient.replace(first_number, "NaN", 1), "cut": None}),
+    "scanned": (None, "", {RIGHT: STATE, "swapped": "supine:full", "axes": STATE.replace("supine", "prone"),
+                           "unit": "supine:rest+8", "range": "supine:rest+9000", "cut": "supine:rest+"}),
     "above": (None, "", {RIGHT: "300", "range": "9000", "finite": "nan", "repeated": "300 300"}),
     "volume": (None, "", {RIGHT: "rest+300", "unit": "4000", "range": "rest+9000", "finite": "rest+nan", "cut": "rest+",
                           "repeated": "rest+300+300"}),
@@ -414,6 +416,10 @@ DOORS = [
      python(lambda: inside.locate(ROWS_INSIDE, np.loadtxt(x, delimiter=",", skiprows=1, usecols=(1, 2, 3))))),
     ("precompute --patient", "command", "patient",
      lambda x: command("precompute", "full.ply", "--patient", x, "--scanned", "full", *QUICK, "-o", "out.st")),
+    ("precompute --patient --scanned", "command", "scanned",
+     lambda x: command("precompute", "rest.ply", "--patient", "patient.json", "--scanned", x, *QUICK, "-o", "out.st")),
+    ("precompute(patient, scanned)", "Python", "scanned",
+     lambda x: python(lambda: supine.precompute("rest.ply", patient="patient.json", scanned=x, band=3, held_out=5))),
     ("precompute SCAN --patient", "command", "scan",  # of landmarks; the scan may be either of the two
      lambda x: None if "swapped" in x else command("precompute", x, "--patient", "marks.json", *QUICK, "-o", "out.st")),
     ("deform --gravity", "command", "gravity",

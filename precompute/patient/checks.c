@@ -20,6 +20,8 @@ enum { GROUPS = 20, NEIGHBOURS = 8, PAIRS_LEAST = 30, NAMED_MOST = 12 };
 
 /* A coarse surface cuts corners off the lungs, up to about this share of its edge length. */
 static const double cut = 0.8;
+/* Directions of gravity that differ by more are of different postures. */
+static const double same_posture = 0.05;
 static const double growth_least = 0.02; /* smaller changes of ln(volume) are none */
 static const double dropped_most = 0.2;  /* largest share of the pairs that are dropped */
 /* A pair that differs by less from its neighbours is not dropped, mm. */
@@ -368,4 +370,29 @@ supine_status supine_patient_check_lungs(const supine_patient_record *fitted, si
                          held, volume, check_fit);
   }
   return check_fitted_landmarks(&fitted->patient, state, &lungs->mesh, findings, error);
+}
+
+void supine_patient_check_state(const supine_state *given, const supine_state *fitted, double held,
+                                const supine_resting *resting, supine_findings *findings) {
+  const double full = supine_patient_full_volume(fitted, held, resting);
+  const double full_given = supine_patient_full_volume(given, held, resting);
+  const bool turned = supine_distance(given->gravity, fitted->gravity) > same_posture;
+  const double ratio = full > 0.0 && full_given > 0.0 ? full_given / full : 1.0;
+  const bool other = is_told(SUPINE_INPUT_PATIENT_VOLUME, fmax(ratio, 1.0 / ratio));
+  char names[2][160];
+  char volumes[128] = "";
+  (void)supine_state_print(given, names[0], sizeof names[0]);
+  (void)supine_state_print(fitted, names[1], sizeof names[1]);
+  if (other) {
+    supine_text_add(volumes, sizeof volumes,
+                    ", by which full inflation is %.0f mL instead of %.0f mL", full, full_given);
+  }
+  if (turned || other) {
+    const supine_remedy advice[SUPINE_REMEDIES_MAX] = {supine_remedy_omit("scanned")};
+    supine_findings_warn(findings,
+                         "the state of the scan is given as %s, but the patient's law was fitted "
+                         "to it as %s%s: if the fit is wrong, fit again with the right states",
+                         names[0], names[1], volumes);
+    supine_findings_advise(findings, advice);
+  }
 }

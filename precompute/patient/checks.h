@@ -77,4 +77,11 @@ supine_status supine_patient_check_lungs(const supine_patient_record *fitted, si
                                          const supine_lungs *lungs, supine_findings *findings,
                                          supine_error *error);
 
+/** Warn if a scan is given another state than a fit has it in: another posture, or a volume by
+ * which full inflation would be another.
+ * @param held     volume of the scan, mL
+ * @param resting  volumes at rest of the fit */
+void supine_patient_check_state(const supine_state *given, const supine_state *fitted, double held,
+                                const supine_resting *resting, supine_findings *findings);
+
 #endif

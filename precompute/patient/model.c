@@ -25,13 +25,10 @@ static const double part_least = 0.02;
 /* Plausible range of the volume at rest divided by the volume at full inflation. */
 static const double share_least = 0.15, share_most = 0.95;
 
-/* Compute the volume at full inflation, mL, from one scanned state; return 0 if it is unknown. */
-static double full_volume(const supine_patient_record *record, size_t state,
-                          const supine_resting *resting) {
-  const supine_state *shown = &record->state[state];
-  const double lung_volume = record->volume[state];
-  const double end = lung_volume - shown->volume.ml; /* volume at full inflation or at rest */
-  if (lung_volume <= 0.0) {
+double supine_patient_full_volume(const supine_state *shown, double held,
+                                  const supine_resting *resting) {
+  const double end = held - shown->volume.ml; /* volume at full inflation or at rest */
+  if (held <= 0.0) {
     return 0.0;
   }
   switch (shown->volume.kind) {
@@ -42,6 +39,12 @@ static double full_volume(const supine_patient_record *record, size_t state,
   default:
     return 0.0;
   }
+}
+
+/* Compute the volume at full inflation, mL, from one scanned state; return 0 if it is unknown. */
+static double full_volume(const supine_patient_record *record, size_t state,
+                          const supine_resting *resting) {
+  return supine_patient_full_volume(&record->state[state], record->volume[state], resting);
 }
 
 static double either_full_volume(const supine_patient_record *record,

@@ -163,6 +163,11 @@ supine_status supine_patient_model(supine_patient_record *record, const supine_l
                                    supine_resting *resting, supine_scan *scan, double *arrays,
                                    supine_model *model, supine_error *error);
 
+/** Return the volume at full inflation, supine, mL, of lungs that hold `held` mL in a state named
+ * from rest or full inflation; 0 if either is unknown. */
+double supine_patient_full_volume(const supine_state *shown, double held,
+                                  const supine_resting *resting);
+
 /** Correct a patient's displacement so that the surface of the scan, displaced to the other state,
  * encloses the volume that was measured there: add h n to the displaced positions. n are the
  * normals of the displaced surface, smoothed ten times; h is one distance for each lung, or the
