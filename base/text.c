@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Build sentences from parts, compare endings of names, and decode base64. */
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -75,12 +76,20 @@ char *supine_text_make_utf8(char *text) {
   return text;
 }
 
-supine_distance_text supine_text_distance(double mm) {
-  supine_distance_text distance = {"below 0.002"};
+supine_number_text supine_text_distance(double mm) {
+  supine_number_text distance = {"below 0.002"};
   if (!(mm < SUPINE_TEXT_DISTANCE_LEAST)) { /* true if it is NaN */
     (void)supine_print_text(distance.text, sizeof distance.text, "%.3f", mm);
   }
   return distance;
+}
+
+supine_number_text supine_text_change(double change) {
+  supine_number_text text = {"0"};
+  if (!(fabs(change) < 0.5)) { /* true if it is NaN */
+    (void)supine_print_text(text.text, sizeof text.text, "%+.0f", change);
+  }
+  return text;
 }
 
 size_t supine_text_decode_base64(const char *at, const char *end, unsigned char *bytes) {

@@ -40,13 +40,16 @@ bool supine_text_ends_in(const char *name, const char *ending);
  * depend on the processor. */
 #define SUPINE_TEXT_DISTANCE_LEAST 0.002
 
-/** Text of a distance (supine_text_distance). */
-typedef struct supine_distance_text {
+/** Text of a number. */
+typedef struct supine_number_text {
   char text[32];
-} supine_distance_text;
+} supine_number_text;
 
 /** Format a distance in mm: with three decimals, or as "below 0.002". */
-supine_distance_text supine_text_distance(double mm);
+supine_number_text supine_text_distance(double mm);
+
+/** Format a change rounded to a whole number: with its sign, or as "0". */
+supine_number_text supine_text_change(double change);
 
 /** Decode base64 (RFC 4648) from `at` up to `end`, or to the first character that is neither base64
  * nor white space. Several streams may follow each other, each padded to groups of four characters.

@@ -320,7 +320,7 @@ static void check_runs(const char *name, const supine_fit_report *report,
 static void check_motion(const char *name, const supine_fit_frame *frame,
                          supine_findings *findings) {
   static const char *const axes[] = {"-z", "-y", "-x", "", "x", "y", "z"};
-  const supine_distance_text moved = supine_text_distance(frame->moved_mm);
+  const supine_number_text moved = supine_text_distance(frame->moved_mm);
   if (supine_input_judge(SUPINE_INPUT_FIELDS_UNIT, frame->moved_mm) != SUPINE_INPUT_TAKEN) {
     supine_findings_warn(findings,
                          "%s: gravity moves the lungs by %s mm RMS only: are the "

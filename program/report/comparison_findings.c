@@ -152,11 +152,11 @@ static json_t *make_lungs(const supine_comparison *c, size_t posture) {
     const supine_fact held = supine_report_held(c, posture, lung);
     json_t *range = isfinite(held.low) ? json_sprintf("%.0f to %.0f", held.low, held.high)
                                        : json_string(supine_fact_source_name(held.source));
-    (void)json_array_append_new(
-        lungs, json_pack("{s:o, s:o, s:o, s:s*}", "range", range, "ml",
-                         json_sprintf("%.0f", p->volume[lung]), "percent",
-                         json_sprintf(fabs(percent[lung]) < 0.5 ? "0" : "%+.0f", percent[lung]),
-                         "mark", mark_of(c, posture, "percent")));
+    (void)json_array_append_new(lungs,
+                                json_pack("{s:o, s:o, s:o, s:s*}", "range", range, "ml",
+                                          json_sprintf("%.0f", p->volume[lung]), "percent",
+                                          json_string(supine_text_change(percent[lung]).text),
+                                          "mark", mark_of(c, posture, "percent")));
   }
   return lungs;
 }

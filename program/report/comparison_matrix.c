@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "base/locale.h"
+#include "base/text.h"
 #include "program/report/comparison.h"
 
 enum { POSTURES_MAX = 4 }; /* columns of a table, besides the names */
@@ -31,7 +32,8 @@ static json_t *anatomy_cell(const supine_target *t) {
   json_t *cell = target_cell(t);
   json_t *moves = json_sprintf("moves %s", json_string_value(json_object_get(cell, "size")));
   (void)json_object_set_new(cell, "size",
-                            json_sprintf("%+.0f mL (%+.0f %%)", gain, 100.0 * gain / t->volume[0]));
+                            json_sprintf("%s mL (%s %%)", supine_text_change(gain).text,
+                                         supine_text_change(100.0 * gain / t->volume[0]).text));
   (void)json_object_set_new(cell, "words", moves);
   (void)json_object_set_new(cell, "untold", json_false());
   return cell;

@@ -7,6 +7,7 @@
 #include "base/arena.h"
 #include "base/locale.h"
 #include "base/number.h"
+#include "base/text.h"
 
 #include "program/report/comparison.h"
 #include "program/view/render/render.h"
@@ -220,8 +221,9 @@ static json_t *area_title(const supine_comparison *c, const slice *s, double bef
   json_t *title = json_sprintf("%s: area", s->name);
   for (size_t i = 0; i < c->postures.count; ++i) {
     if (!supine_report_is_reference(c, i)) {
-      json_t *longer = json_sprintf("%s%s %s %+.0f %%", json_string_value(title), separator,
-                                    c->posture[i].label, 100 * (area[i] / before - 1));
+      json_t *longer =
+          json_sprintf("%s%s %s %s %%", json_string_value(title), separator, c->posture[i].label,
+                       supine_text_change(100 * (area[i] / before - 1)).text);
       json_decref(title);
       title = longer;
       separator = ",";
@@ -285,7 +287,7 @@ static void add_target(const supine_comparison *c, const slice *s, size_t k, con
   SUPINE_C_LOCALE;
   double from[2];
   json_t *dots = json_array();
-  double radius = 6.5; /* mm */
+  double radius = 3.2; /* mm, below most errors, so that their rings are seen */
   project(s, was, from);
   for (size_t i = 0; i < c->postures.count; ++i) {
     if (!supine_report_is_reference(c, i)) {

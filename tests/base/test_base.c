@@ -154,6 +154,12 @@ TEST(test_text_distance_below_level_of_storage_without_digits) {
   assert_string_equal(supine_text_distance((double)NAN).text, "nan");
 }
 
+TEST(test_text_change_below_half_without_sign) {
+  assert_string_equal(supine_text_change(-0.49).text, "0");
+  assert_string_equal(supine_text_change(-0.51).text, "-1");
+  assert_string_equal(supine_text_change(12.3).text, "+12");
+}
+
 static void read_text(const char *path, char *text, size_t size) {
   FILE *file = fopen(path, "rb");
   assert_non_null(file);
