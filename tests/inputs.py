@@ -9,8 +9,8 @@ The folder, build/release by default, must have the program and the shared libra
 import ctypes
 import functools
 import os
-import struct
 
+from helpers.nifti import header
 from helpers.verdict import (command, even, javascript, leave, pose_in_c, python, stream, supine, table,
                              transform, write_ply)
 import numpy as np
@@ -171,17 +171,9 @@ def mapped(voxels, **options):
 def nifti(offset):
     """A basis made from a label map in NIfTI whose header says that the voxels begin at `offset`."""
     def run(call):
-        head = bytearray(352)
-        struct.pack_into("<i", head, 0, 348)
-        struct.pack_into("<8h", head, 40, 3, *sides.shape[::-1], 1, 1, 1, 1)
-        struct.pack_into("<2h", head, 70, 2, 8)
-        struct.pack_into("<9f", head, 76, *[1, *np.linalg.norm(frame[1:], axis=1), 1, 1, 1, 1], offset)
-        struct.pack_into("<2h", head, 252, 0, 1)
-        for k in range(3):
-            struct.pack_into("<4f", head, 280 + 16 * k, *((-1 if k < 2 else 1) * np.append(frame[1:, k], frame[0, k])))
-        head[123], head[344:348] = 2, b"n+1\0"
+        rows = np.diag([-1, -1, 1]) @ np.column_stack([frame[1:].T, frame[0]])
         with open("map.nii", "wb") as file:
-            file.write(bytes(head) + sides.tobytes())
+            file.write(header(sides.shape[::-1], 8, rows, offset) + sides.tobytes())
         return call()
     return {key: lambda call=call: run(call) for key, call in made("map.nii", edge=8).items()}
 

@@ -24,11 +24,13 @@ import gzip
 import operator
 import os
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
 import time
+
+sys.path.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from helpers import nifti  # noqa: E402
 
 VOXELS = (512, 512, 248)
 
@@ -37,21 +39,9 @@ def write_image(path, label):
     """Write a NIfTI image that covers the synthetic lungs, of 8-bit labels if `label`, else of 16-bit noise
     from -1024 to -769 HU, so that it holds air."""
     step, origin = (0.7, 0.7, 1.2), (-2.0 - 0.35 * 512, -173.0 - 0.35 * 512, -130.0 - 0.6 * 248)
-    header = bytearray(352)
-    struct.pack_into("<i", header, 0, 348)
-    struct.pack_into("<8h", header, 40, 3, *VOXELS, 1, 1, 1, 1)
-    struct.pack_into("<hh", header, 70, 2 if label else 4, 8 if label else 16)
-    struct.pack_into("<4f", header, 76, 1.0, *step)
-    struct.pack_into("<2f", header, 108, 352.0, 1.0)
-    header[123] = 2  # the unit is mm
-    struct.pack_into("<hh", header, 252, 0, 1)
-    for axis in range(3):  # a row of the matrix from voxels to RAS
-        sign = 1.0 if axis == 2 else -1.0
-        row = [sign * step[axis] if k == axis else 0.0 for k in range(3)]
-        struct.pack_into("<4f", header, 280 + 16 * axis, *row, sign * origin[axis])
-    header[344:347] = b"n+1"
+    rows = ((-step[0], 0, 0, -origin[0]), (0, -step[1], 0, -origin[1]), (0, 0, step[2], origin[2]))
     with open(path, "wb") as file:
-        file.write(header)
+        file.write(nifti.header(VOXELS, 8 if label else 16, rows))
         for k in range(VOXELS[2]):
             if label:
                 row = bytes(i >> 5 for i in range(VOXELS[0]))

@@ -8,10 +8,12 @@ import gzip
 import json
 import os
 import re
-import struct
 import subprocess
 import sys
 import tempfile
+
+sys.path.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from helpers import nifti  # noqa: E402
 
 supine, source, build = map(os.path.abspath, sys.argv[1:4])
 SERVERS = ("stream",)  # run until they are stopped; the tests of the stream run them
@@ -46,18 +48,9 @@ def make_inputs():
     run("embed", "lungs.safetensors", "nodules.csv", "-o", "inside.safetensors")
     run("embed", "lungs.safetensors", "--grid", "20", "-o", "grid.safetensors")
     run("deform", "inside.safetensors", "--posture", "prone", "-o", "seen.csv")
-    header = bytearray(352)
-    struct.pack_into("<i", header, 0, 348)
-    struct.pack_into("<8h", header, 40, 3, 20, 20, 20, 1, 1, 1, 1)
-    struct.pack_into("<hh", header, 70, 4, 16)
-    struct.pack_into("<9f", header, 76, 1, 20, 20, 20, 0, 0, 0, 0, 352)
-    struct.pack_into("<ff", header, 112, 1, 0)
-    header[123] = 2  # mm
-    struct.pack_into("<hh", header, 252, 0, 1)
-    struct.pack_into("<12f", header, 280, 20, 0, 0, -200, 0, 20, 0, -10, 0, 0, 20, -300)
-    header[344:347] = b"n+1"
     with gzip.open("ct.nii.gz", "wb") as file:
-        file.write(bytes(header) + struct.pack("<h", -800) * 8000)
+        file.write(nifti.header((20, 20, 20), 16, ((20, 0, 0, -200), (0, 20, 0, -10), (0, 0, 20, -300))))
+        file.write((-800).to_bytes(2, "little", signed=True) * 8000)
 
 
 def check(code):
@@ -81,16 +74,6 @@ def check(code):
 def write_mask(name, side):
     """Write a mask in NIfTI with an ellipsoid, the lung on the side -1 (right) or 1 (left), in voxels of 8 mm."""
     size = 48
-    header = bytearray(352)
-    struct.pack_into("<i", header, 0, 348)
-    struct.pack_into("<8h", header, 40, 3, size, size, size, 1, 1, 1, 1)
-    struct.pack_into("<hh", header, 70, 2, 8)
-    struct.pack_into("<9f", header, 76, 1, 8, 8, 8, 0, 0, 0, 0, 352)
-    struct.pack_into("<ff", header, 112, 1, 0)
-    header[123] = 2  # mm
-    struct.pack_into("<hh", header, 252, 0, 1)
-    struct.pack_into("<12f", header, 280, 8, 0, 0, -190, 0, 8, 0, -190, 0, 0, 8, -330)
-    header[344:347] = b"n+1"
     voxels = bytearray(size ** 3)
     for z in range(size):
         for y in range(size):
@@ -99,7 +82,7 @@ def write_mask(name, side):
                 if ((p[0] + 85 * side) / 65) ** 2 + ((p[1] + 10) / 95) ** 2 + ((p[2] + 140) / 130) ** 2 < 1:
                     voxels[(z * size + y) * size + x] = 1
     with gzip.open(name, "wb") as file:
-        file.write(bytes(header) + bytes(voxels))
+        file.write(nifti.header((size, size, size), 8, ((8, 0, 0, -190), (0, 8, 0, -190), (0, 0, 8, -330))) + voxels)
 
 
 def check_readme():
