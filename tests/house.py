@@ -29,10 +29,15 @@ PUBLIC = ("runtime/include/supine", "precompute/include/supine")
 LIBRARY = ("base", "runtime") + PUBLIC
 
 
+def read(file):
+    """Return the text of a file, by its path in the sources."""
+    with open(os.path.join(source, file), encoding="utf-8") as opened:
+        return opened.read()
+
+
 def read_table():
     folders = {}
-    with open(os.path.join(source, "ARCHITECTURE.md"), encoding="utf-8") as readme:
-        table = re.findall(r"^\| `(?:base|sh|mesh|precompute|runtime|program)[a-z/]*`.*$", readme.read(), re.M)
+    table = re.findall(r"^\| `(?:base|sh|mesh|precompute|runtime|program)[a-z/]*`.*$", read("ARCHITECTURE.md"), re.M)
     rows = []
     for line in table:
         row = re.fullmatch(r"\| `([a-z/]+)` \|([^|]*)\|([^|]*)\|", line)
@@ -83,11 +88,10 @@ def scripts():
 
 def included(file):
     """Yield the folder and the name of each file of the project that `file` includes."""
-    with open(os.path.join(source, file), encoding="utf-8") as text:
-        for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', text.read(), re.M):
-            for path in [name] + [f"{folder[:-len('/supine')]}/{name}" for folder in PUBLIC]:
-                if os.path.exists(os.path.join(source, path)):
-                    yield os.path.dirname(path), name
+    for name in re.findall(r'^#\s*include\s+[<"]([^>"]+)[>"]', read(file), re.M):
+        for path in [name] + [f"{folder[:-len('/supine')]}/{name}" for folder in PUBLIC]:
+            if os.path.exists(os.path.join(source, path)):
+                yield os.path.dirname(path), name
 
 
 def check_includes(folders, files):
@@ -105,10 +109,18 @@ def check_system_headers(files):
     library = PUBLIC + ("runtime", "runtime/safetensors", "runtime/kernels", "runtime/compare")
     for file in files:
         if os.path.dirname(file) in library and os.path.basename(file) not in ("posix.c", "windows.c"):
-            with open(os.path.join(source, file), encoding="utf-8") as text:
-                for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
-                                       text.read(), re.M):
-                    faults.append(f"{file} includes {name}: only posix.c and windows.c may include system headers")
+            for name in re.findall(r"^#\s*include\s+<((?:sys/|unistd|fcntl|dirent|pthread|strings|windows).*?)>",
+                                   read(file), re.M):
+                faults.append(f"{file} includes {name}: only posix.c and windows.c may include system headers")
+
+
+def in_cycles(graph):
+    """Return the nodes of a graph {node: nodes that it uses} that lie on or between cycles."""
+    while leaves := {f for f, out in graph.items() if not out & set(graph)}:
+        graph = {f: out for f, out in graph.items() if f not in leaves}
+    while roots := set(graph) - {f for out in graph.values() for f in out}:
+        graph = {f: out for f, out in graph.items() if f not in roots}
+    return sorted(graph)
 
 
 def check_include_cycles(files):
@@ -119,10 +131,8 @@ def check_include_cycles(files):
             target = os.path.join(used, os.path.basename(name))
             if target in graph and target != file:
                 graph[file].add(target)
-    while leaves := {f for f, out in graph.items() if not out & set(graph)}:
-        graph = {f: out for f, out in graph.items() if f not in leaves}
-    if graph:
-        faults.append(f"files that include each other in cycles: {sorted(graph)}")
+    if in_cycles(graph):
+        faults.append(f"files that include each other in cycles: {in_cycles(graph)}")
 
 
 def objects():
@@ -146,8 +156,7 @@ def declaring_folders(files):
     folder_of = {}
     for file in files:
         if file.endswith(".h"):
-            with open(os.path.join(source, file), encoding="utf-8") as opened:
-                text = without_comments(opened.read())
+            text = without_comments(read(file))
             for name in re.findall(r"\b(supine_\w+)\(", text) + [
                     name for names in re.findall(r"^extern ([^;]*);", text, re.M)
                     for name in re.findall(r"\bsupine_\w+", names)]:
@@ -168,12 +177,8 @@ def check_names(folders, files):
             if not symbol.startswith((prefix, "__")) and symbol + "_" != prefix:
                 faults.append(f"{file}.c defines {symbol}, which does not begin with {prefix}")
     graph = {file: {home[name] for name in used if name in home} - {file} for file, _, used in listed}
-    while leaves := {f for f, out in graph.items() if not out & set(graph)}:
-        graph = {f: out for f, out in graph.items() if f not in leaves}
-    while roots := set(graph) - {f for out in graph.values() for f in out}:
-        graph = {f: out for f, out in graph.items() if f not in roots}
-    if graph:
-        faults.append(f"files that use each other in cycles: {sorted(graph)}")
+    if in_cycles(graph):
+        faults.append(f"files that use each other in cycles: {in_cycles(graph)}")
     if len(listed) < len(folders):
         faults.append(f"only {len(listed)} object files in {build}: build first")
 
@@ -187,8 +192,7 @@ def check_sizes(files):
     for file in files:
         if not file.endswith(".c"):
             continue
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            text = opened.read()
+        text = read(file)
         for found in begin.finditer(text):
             name, parameters = head.search(found.group()).groups()
             lines = text.count("\n", found.start(), text.index("\n}", found.end())) + 2
@@ -203,13 +207,10 @@ def check_sizes(files):
 
 def check_licences():
     """Check that LICENSE and .reuse/dep5 name no file and no folder that does not exist."""
-    with open(os.path.join(source, "LICENSE"), encoding="utf-8") as opened:
-        named = [("LICENSE", path) for path in re.findall(r"[\w.-]+/[\w./-]*\w", opened.read())]
-    dep5 = os.path.join(source, ".reuse", "dep5")
-    if os.path.exists(dep5):
-        with open(dep5, encoding="utf-8") as opened:
-            named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", opened.read(), re.M)
-                      for path in line.split()]
+    named = [("LICENSE", path) for path in re.findall(r"[\w.-]+/[\w./-]*\w", read("LICENSE"))]
+    if os.path.exists(os.path.join(source, ".reuse/dep5")):
+        named += [(".reuse/dep5", path) for line in re.findall(r"^Files:(.*)$", read(".reuse/dep5"), re.M)
+                  for path in line.split()]
     for file, path in named:
         if not glob.glob(os.path.join(source, path)):
             faults.append(f"{file}: {path} does not exist")
@@ -227,10 +228,9 @@ def check_opening(files):
     opening = re.compile(r"\b(fopen|freopen|open|openat|gzopen|json_load_file)\((?!\s*\")")
     for file in files:
         if file.endswith(".c") and file not in OPENING:
-            with open(os.path.join(source, file), encoding="utf-8") as text:
-                for name in opening.findall(text.read()):
-                    faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a "
-                                  f"name from a file")
+            for name in opening.findall(read(file)):
+                faults.append(f"{file} calls {name}: call supine_input_open, or supine_input_open_beside for a "
+                              f"name from a file")
 
 
 # Sources of functions that the JavaScript package calls and that have remedies.
@@ -291,8 +291,7 @@ def check_locale(files):
     """Check that numbers are parsed and printed, and letters compared, only by functions that ignore the locale of the
     host."""
     for file in files:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            text = without_comments(opened.read())
+        text = without_comments(read(file))
         for call in CALL.finditer(text if file not in LOCALE_FILES else ""):
             function = text[text.rfind("\n}", 0, call.start()) + 1:call.start()]
             fault = locale_fault(call[1], arguments(text, call.end()), function)
@@ -304,11 +303,10 @@ def check_locale(files):
 def check_distances(files):
     """Check that distances in mm which may be rounding errors are printed by supine_text_distance."""
     for file in files:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|"
-                                     r"(?:residual|displacement|distance) %\.\dg mm", opened.read()):
-                faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use "
-                              f"supine_text_distance")
+        for digits in re.findall(r"%\.\dg mm (?:RMS|at most|largest|apart|95th)|"
+                                 r"(?:residual|displacement|distance) %\.\dg mm", read(file)):
+            faults.append(f"{file}: '{digits}': digits below rounding depend on the processor: use "
+                          f"supine_text_distance")
 
 
 def check_remedies(files):
@@ -316,11 +314,10 @@ def check_remedies(files):
     options, and that no error is set to the message of another without its remedies. Comments may name options, as an
     option is the shortest name of what it sets."""
     options, advised = set(), []
-    with open(os.path.join(source, "program", "command", "list.h"), encoding="utf-8") as opened:
-        command = re.compile(r"\bsupine (?:%s)\b" % "|".join(re.findall(r"^  COMMAND\((\w+)\)", opened.read(), re.M)))
+    commands = re.findall(r"^  COMMAND\((\w+)\)", read("program/command/list.h"), re.M)
+    command = re.compile(r"\bsupine (?:%s)\b" % "|".join(commands))
     for file in files:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            text = without_comments(opened.read())
+        text = without_comments(read(file))
         options |= set(re.findall(r'\{"([a-z][a-z-]*)", (?:0|\'.\'),', text) if file.startswith("program/") else ())
         for literal in LITERAL.finditer(text if not file.startswith("program/") else ""):
             for name in re.findall(r"--[a-z][a-z-]*", literal[1]):
@@ -348,11 +345,10 @@ def check_waits():
         below[:] = [name for name in below if name not in ("node_modules", "bench")]
         for name in (name for name in names if name.endswith((".c", ".cpp", ".py", ".mjs", ".sh"))
                      and name != "house.py"):
-            with open(os.path.join(folder, name), encoding="utf-8") as opened:
-                for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*",
-                                       opened.read(), re.M):
-                    faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a "
-                                  f"later message")
+            for wait in re.findall(r"\bwaitForTimeout\(|\btime\.sleep\(|\bu?sleep\(|^ *sleep [\d$].*",
+                                   read(os.path.join(folder, name)), re.M):
+                faults.append(f"{os.path.join(folder, name)}: '{wait}': wait for an event or for the answer to a "
+                              f"later message")
 
 
 def check_python_names(files):
@@ -374,8 +370,7 @@ def check_python_names(files):
     if unknown("import os\ndef f(a):\n    return [os.name for b in a if b != c]\n", "") != ["c"]:
         faults.append("house.py does not find a name that is not defined")
     for file in files:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            text = opened.read()
+        text = read(file)
         if not re.search(r"^from \S+ import \*", text, re.M):
             faults.extend(f"{file}: the name {name} is not defined" for name in unknown(text, file))
 
@@ -514,8 +509,7 @@ def check_forms(files):
         if not list(forms_of(refused)) or list(forms_of(plain)):
             faults.append(f"house.py does not tell '{refused}' from '{plain}'")
     for file in files:
-        with open(os.path.join(source, file), encoding="utf-8") as opened:
-            written = opened.read()
+        written = read(file)
         text = code_of(written)
         for position, form in forms_of(text):
             line = text.count("\n", 0, position) + 1
@@ -530,17 +524,14 @@ def check_examples():
     examples/README.md."""
     defined = set()
     for path in glob.glob(os.path.join(source, "tests", "*.cmake")) + [os.path.join(source, "tests", "CMakeLists.txt")]:
-        with open(path, encoding="utf-8") as opened:
-            rules = opened.read().replace("npm_${where}", "npm_node")
-            defined |= set(re.findall(r"(?:add_test\(NAME |supine_test\((?:\w+/)?)([\w$\{}]+)", rules))
-    with open(os.path.join(source, "examples", "README.md"), encoding="utf-8") as opened:
-        table = set(re.findall(r"^\| \[(\w+)\]\(\1/README\.md\) \|", opened.read(), re.M))
+        rules = read(path).replace("npm_${where}", "npm_node")
+        defined |= set(re.findall(r"(?:add_test\(NAME |supine_test\((?:\w+/)?)([\w$\{}]+)", rules))
+    table = set(re.findall(r"^\| \[(\w+)\]\(\1/README\.md\) \|", read("examples/README.md"), re.M))
     present = {name for name in os.listdir(os.path.join(source, "examples")) if name != "README.md"}
     faults.extend(f"examples/README.md: no row for {name}" for name in sorted(present - table))
     faults.extend(f"examples/README.md: {name} does not exist" for name in sorted(table - present))
     for name in sorted(present & table):
-        with open(os.path.join(source, "examples", name, "README.md"), encoding="utf-8") as opened:
-            text = opened.read()
+        text = read(f"examples/{name}/README.md")
         tests = set(re.findall(r"test `(\w+)`", text))
         if not tests or not tests <= defined | {"npm_browser"}:
             faults.append(f"examples/{name}/README.md: name the tests that build or run the example: {sorted(tests)}")
