@@ -193,8 +193,7 @@ supine_status supine_basis_pose_gain(const supine_basis *basis, const double gra
                             "displacements of this basis depend on the volume: give a volume "
                             "instead of a gain");
   default:
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is zero or not finite: give a vector with a direction");
+    return supine_basis_refuse_gravity(error);
   }
   supine_pose_fill(pose, gain);
   return basis->allow_folds ? SUPINE_OK : supine_basis_check(basis, &state, pose, error);

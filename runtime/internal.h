@@ -144,6 +144,10 @@ static inline size_t supine_space_doubles(size_t bytes) {
   return (bytes + sizeof(double) - 1) / sizeof(double);
 }
 
+/** Refuse gravity without a direction, and a volume of an unknown kind. */
+supine_status supine_basis_refuse_gravity(supine_error *error);
+supine_status supine_basis_refuse_kind(supine_volume_kind kind, supine_error *error);
+
 /** Find the lungs that a state names.
  * @param lungs  written: lungs[i] is the index of the lung that state->lungs[i] names
  * @retval SUPINE_ERROR_ARGUMENT  not all lungs are named, or a name is unknown or given twice */

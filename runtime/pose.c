@@ -47,18 +47,13 @@ typedef struct volumes {
   double rest_total;
 } volumes;
 
-static supine_status refuse_gravity(supine_error *error) {
-  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                          "gravity is zero or not finite: give a vector with a direction");
-}
-
 static supine_status find_volumes(const supine_basis *basis, const double gravity[3],
                                   const double *weights, volumes *v, supine_error *error) {
   double y[RESTING_TERMS];
   *v = (volumes){.lung_count = basis->info.lung_count};
   double unit[3];
   if (supine_sh_evaluate(2, gravity, y) != SUPINE_OK || !supine_normalise(gravity, unit)) {
-    return refuse_gravity(error);
+    return supine_basis_refuse_gravity(error);
   }
   const double up = fmax(0, -unit[2]);
   for (size_t lung = 0; lung < v->lung_count; ++lung) {
@@ -73,12 +68,11 @@ static supine_status find_volumes(const supine_basis *basis, const double gravit
 }
 
 static supine_status refuse(const char *what, supine_error *error) {
-  (void)supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                         "this basis has no volume at %s, as its scan was used unchanged: give "
-                         "scan+ML or an absolute volume such as 2600mL, or make the basis with the "
-                         "law deep and the state of its scan",
-                         what);
-  return SUPINE_ERROR_ARGUMENT;
+  return supine_error_set(
+      error, SUPINE_ERROR_ARGUMENT,
+      "this basis has no volume at %s, as its scan was used unchanged: give scan+ML or an absolute "
+      "volume such as 2600mL, or make the basis with the law deep and the state of its scan",
+      what);
 }
 
 /* Convert a volume of any kind to the volume of all lungs minus the reference volume, mL. */
@@ -98,9 +92,7 @@ static supine_status total_of(const supine_basis *basis, const volumes *v,
     *total = basis->scan_volume + volume->ml;
     return SUPINE_OK;
   default:
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "volume kind %d is unknown: use a value of supine_volume_kind",
-                            (int)volume->kind);
+    return supine_basis_refuse_kind(volume->kind, error);
   }
 }
 
@@ -286,12 +278,12 @@ static supine_status move_modes(const supine_basis *basis, const supine_state *s
   if (basis->info.order > 0) {
     double unit[3];
     if (!supine_normalise(state->gravity, unit)) {
-      return refuse_gravity(error);
+      return supine_basis_refuse_gravity(error);
     }
     return supine_simulated_pose(basis, state, pose, error);
   }
   if (supine_basis_weights(basis, state->gravity, pose->weights) != SUPINE_OK) {
-    return refuse_gravity(error);
+    return supine_basis_refuse_gravity(error);
   }
   return find_gains(basis, state, pose, error);
 }

@@ -314,9 +314,7 @@ static supine_status find_origin(const supine_basis *basis, const double gravity
       volumes[lung] = 0;
       break;
     default:
-      return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                              "volume kind %d is unknown: use a value of supine_volume_kind",
-                              (int)kind);
+      return supine_basis_refuse_kind(kind, error);
     }
   }
   return SUPINE_OK;

@@ -13,6 +13,7 @@
 #include "base/number.h"
 #include "base/quantity.h"
 #include "base/vec3.h"
+#include "runtime/internal.h"
 #include "runtime/words.h"
 
 static const char *const kinds[] = {[SUPINE_VOLUME_DEFAULT] = "",
@@ -381,4 +382,15 @@ size_t supine_state_print(const supine_state *state, char *text, size_t size) {
 
 size_t supine_state_describe(const supine_state *state, char *text, size_t size) {
   return add_state(state, true, text, size);
+}
+
+supine_status supine_basis_refuse_gravity(supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "gravity is zero or not finite: give a vector with a direction");
+}
+
+supine_status supine_basis_refuse_kind(supine_volume_kind kind, supine_error *error) {
+  return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
+                          "volume kind %d is unknown: use a value of supine_volume_kind",
+                          (int)kind);
 }

@@ -177,8 +177,7 @@ supine_status supine_compare_slabs(const supine_basis *basis, const double gravi
                             (int)SUPINE_SLABS_MAX);
   }
   if (!supine_normalise(gravity, c.down)) {
-    return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
-                            "gravity is zero or not finite: give a vector with a direction");
+    return supine_basis_refuse_gravity(error);
   }
   if (!basis->info.has_volume) {
     return supine_error_set(error, SUPINE_ERROR_OPEN_SURFACE,
