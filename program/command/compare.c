@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/arena.h"
-#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 #include "base/vec3.h"
@@ -23,11 +22,8 @@
 static supine_status write_markups(const char *path, const supine_comparison *c,
                                    supine_error *error) {
   json_t *lists = json_array();
-  char meaning[256 + SUPINE_CAVEATS_SIZE];
-  char caveats[SUPINE_CAVEATS_SIZE];
-  (void)supine_basis_caveats(c->basis, caveats, sizeof caveats);
-  (void)supine_print_text(meaning, sizeof meaning, "displacement from %s; errors: %s; %s",
-                          c->reference.name, SUPINE_EXPECTED_MEANING, caveats);
+  char meaning[SUPINE_MARKUPS_DESCRIPTION];
+  supine_options_markups_describe(c->basis, c->reference.name, meaning);
   for (size_t i = 0; i < c->postures.count; ++i) {
     (void)json_array_append_new(lists,
                                 supine_options_markup(c->postures.item[i].name, meaning,

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Write moved points, or the structures that they belong to, as CSV or markups of 3D Slicer. */
 #include "base/csv.h"
-#include "base/number.h"
 #include "base/output.h"
 #include "program/command/deform_content.h"
-#include "program/options/facts.h"
 #include "program/options/inside.h"
 #include "program/options/markups.h"
 
@@ -15,15 +13,6 @@ static void in_frame(supine_axes axes, double unit, const double lps[3], double 
   for (int i = 0; i < 3; ++i) {
     out[i] = (matrix[0][i] * lps[0] + matrix[1][i] * lps[1] + matrix[2][i] * lps[2]) / unit;
   }
-}
-
-/* Write what the numbers of markups mean, and what the basis assumes. */
-static void print_meaning(const supine_deformation *moved, const supine_basis *basis, char *text,
-                          size_t size) {
-  char caveats[SUPINE_CAVEATS_SIZE];
-  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
-  (void)supine_print_text(text, size, "displacement from %s; errors: %s; %s", moved->from.name,
-                          SUPINE_EXPECTED_MEANING, caveats);
 }
 
 /* Write a CSV file with a row for each target: name, lung, position, displacement and expected
@@ -110,8 +99,8 @@ supine_status supine_command_deform_points(const char *path, const supine_basis 
   (void)supine_state_describe(&moved->state, state, sizeof state);
   if (supine_options_markups_named(path)) {
     json_t *lists = json_array();
-    char meaning[256 + SUPINE_CAVEATS_SIZE];
-    print_meaning(moved, basis, meaning, sizeof meaning);
+    char meaning[SUPINE_MARKUPS_DESCRIPTION];
+    supine_options_markups_describe(basis, moved->from.name, meaning);
     (void)json_array_append_new(lists, supine_options_markup(state, meaning, rows, count));
     SUPINE_TRY(supine_options_markups_write(path, lists, error));
   } else {

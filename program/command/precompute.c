@@ -286,10 +286,6 @@ static supine_status print_plan(size_t directions, size_t volumes, supine_error 
   return SUPINE_OK;
 }
 
-static int show_progress(void *progress, double fraction) {
-  return supine_options_progress_step(progress, fraction) ? 0 : 1;
-}
-
 static void free_bytes(supine_bytes *bytes) {
   free(bytes->data);
 }
@@ -301,7 +297,7 @@ static supine_status write_basis(request *wanted, const supine_prepared *prepare
   supine_precompute_options *options = &wanted->model.precompute;
   supine_findings findings = {.count = 0};
   supine_progress progress = supine_options_progress_begin(name);
-  options->progress = show_progress;
+  options->progress = supine_options_progress_show;
   options->context = &progress;
   const supine_status status =
       supine_precompute_make(options, prepared, &findings, bytes, report, error);

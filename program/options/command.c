@@ -185,6 +185,10 @@ bool supine_options_progress_step(void *progress, double fraction) {
   return !supine_options_interrupted();
 }
 
+int supine_options_progress_show(void *progress, double fraction) {
+  return supine_options_progress_step(progress, fraction) ? 0 : 1;
+}
+
 void supine_options_progress_end(supine_progress *progress) {
   if (progress->is_shown) {
     (void)fputs("\r\033[K", stderr);

@@ -107,6 +107,10 @@ supine_progress supine_options_progress_begin(const char *label);
 /* Show the fraction of the work done, 0 to 1, and nothing at 1; return false if the user has
  * interrupted the work. */
 bool supine_options_progress_step(void *progress, double fraction);
+
+/* Do the same for the library `precompute`: return 0 to go on. */
+int supine_options_progress_show(void *progress, double fraction);
+
 void supine_options_progress_end(supine_progress *progress);
 
 /* Make SIGINT, SIGTERM and SIGHUP remove unfinished outputs before they end the program. With

@@ -5,9 +5,11 @@
 #include <stdio.h>
 
 #include "base/locale.h"
+#include "base/number.h"
 #include "base/output.h"
 #include "base/text.h"
 
+#include "program/options/basis_input.h"
 #include "program/options/command.h"
 #include "program/options/markups.h"
 
@@ -70,6 +72,14 @@ static json_t *measurement_of(const supine_target *targets, size_t count, size_t
   }
   return json_pack("{s:s, s:b, s:s, s:o}", "name", measures[which].name, "enabled", 1, "units",
                    "mm", "controlPointValues", values);
+}
+
+void supine_options_markups_describe(const supine_basis *basis, const char *from,
+                                     char text[SUPINE_MARKUPS_DESCRIPTION]) {
+  char caveats[SUPINE_CAVEATS_SIZE];
+  (void)supine_basis_caveats(basis, caveats, sizeof caveats);
+  (void)supine_print_text(text, SUPINE_MARKUPS_DESCRIPTION, "displacement from %s; errors: %s; %s",
+                          from, SUPINE_EXPECTED_MEANING, caveats);
 }
 
 json_t *supine_options_markup(const char *name, const char *description,

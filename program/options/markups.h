@@ -3,12 +3,20 @@
 #ifndef SUPINE_OPTIONS_MARKUPS_H
 #define SUPINE_OPTIONS_MARKUPS_H
 
+#include "program/options/facts.h"
 #include "program/options/inside.h"
 
 #define SUPINE_MARKUPS_ENDING ".mrk.json"
 
+enum { SUPINE_MARKUPS_DESCRIPTION = 256 + SUPINE_CAVEATS_SIZE }; /* bytes */
+
 /* Return whether `path` is to be written as markups: whether it ends in .json. */
 bool supine_options_markups_named(const char *path);
+
+/* Write what the numbers of markups mean, and what the basis assumes.
+ * @param from  name of the state that displacements count from */
+void supine_options_markups_describe(const supine_basis *basis, const char *from,
+                                     char text[SUPINE_MARKUPS_DESCRIPTION]);
 
 /* Return a list of control points, one for each target: its name and position, mm, LPS. Its length
  * of displacement and its expected errors are measurements of the list, with the names of the

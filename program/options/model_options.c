@@ -299,10 +299,6 @@ static json_t *list_map(const supine_labels_report *report) {
                    report->axes, "lungs", lungs);
 }
 
-static int show_progress(void *progress, double fraction) {
-  return supine_options_progress_step(progress, fraction) ? 0 : 1;
-}
-
 supine_status supine_options_prepare(const char *command, supine_model_options *model,
                                      const supine_arguments *given, supine_prepared *prepared,
                                      supine_error *error) {
@@ -325,7 +321,7 @@ supine_status supine_options_prepare(const char *command, supine_model_options *
     options->law.kind = supine_precompute_law_of((supine_law)model->law);
   }
   supine_progress progress = supine_options_progress_begin("label map");
-  options->progress = show_progress;
+  options->progress = supine_options_progress_show;
   options->context = &progress;
   const supine_status status = supine_precompute_prepare(options, prepared, error);
   supine_options_progress_end(&progress);
