@@ -215,9 +215,9 @@ def scanned(scale, left=1.0):
     return {"command": run}
 
 
-def fitted(rest):
-    """Fit a scan at rest, called `rest`, and one at full inflation."""
-    return {"command": lambda: command("fit", "rest.ply", "lungs.ply", "--rest", rest, "--other", "supine:full", "-o",
+def fitted(rest, scan="rest.ply"):
+    """Fit a scan at rest, or another, called `rest`, and one at full inflation."""
+    return {"command": lambda: command("fit", scan, "lungs.ply", "--rest", rest, "--other", "supine:full", "-o",
                                        "fitted.json")}
 
 
@@ -308,6 +308,7 @@ CASES = {
     "one-person": (lambda: scanned((1, 1, 1)), lambda: scanned((0.8, 1, 1)), "told"),
     "rest-least": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest+1500"), "told"),
     "rest-most": (lambda: fitted("supine:rest"), lambda: fitted("supine:rest-2500"), "told"),
+    "scans-apart": (lambda: fitted("supine:rest"), lambda: fitted("supine:full-18", "again.ply"), "told"),
     "landmarks-outside": (lambda: paired(), lambda: paired(shift=30.0), "told"),
     "landmarks-order": (lambda: paired(), lambda: paired("--reverse"), "refused"),
     "landmarks-match": (lambda: paired(), lambda: paired(mismatched=3), "told"),
@@ -481,6 +482,7 @@ write_ply("apart.ply", solid + np.where(first_lung == 0, 0, 60)[:, None] * [0, 1
 write_ply("hollow.ply", np.concatenate([solid, middles + 0.97 * (solid - middles)]),
           np.concatenate([corners, corners[:, ::-1] + len(solid)]))
 write_ply("rest.ply", lungs.deform(lungs.pose("supine:rest")).astype(float), corners)
+write_ply("again.ply", (solid - solid.mean(axis=0)) * 0.999 + solid.mean(axis=0), corners)
 write_dae("up.dae", "Z_UP")
 command("fit", "rest.ply", "lungs.ply", "--other", "supine:full", "-o", "patient.json")
 faults = []

@@ -13,6 +13,7 @@
 #include "base/arena.h"
 #include "base/number.h"
 #include "base/remedy.h"
+#include "base/text.h"
 #include "precompute/lungs/surface.h"
 
 void supine_patient_scans_free(supine_patient_scans *scans) {
@@ -245,7 +246,17 @@ static supine_status fit_landmarks(const supine_patient_scans *scans,
                                                options->gravity, &record->applied, error);
 }
 
-supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
+/* Warn of surfaces that are hardly apart, as those of one scan that is given twice. */
+static void warn_of_one_scan(supine_patient_scans *scans, double apart) {
+  if (supine_input_judge(SUPINE_INPUT_SCANS_APART, apart) != SUPINE_INPUT_TAKEN) {
+    supine_findings_warn(&scans->findings,
+                         "the surfaces of the two scans are only %s mm RMS apart, as two surfaces "
+                         "of one scan are: check that they are scans of different states",
+                         supine_text_distance(apart).text);
+  }
+}
+
+supine_status supine_patient_scans_fit(supine_patient_scans *scans,
                                        const supine_patient_fit_options *options,
                                        bool expandability, supine_patient_record *record,
                                        supine_error *error) {
@@ -261,6 +272,7 @@ supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
   if (record->from_surface) {
     SUPINE_TRY(supine_patient_fit_surface(&scans->lungs[0], &scans->lungs[1].mesh, &scans->pairs,
                                           &wanted, expandability, record, error));
+    warn_of_one_scan(scans, record->surface.before);
   } else {
     SUPINE_TRY(fit_landmarks(scans, &wanted, record, error));
   }

@@ -29,10 +29,11 @@ void supine_patient_scans_free(supine_patient_scans *scans);
 supine_status supine_patient_scans_order(supine_patient_scans *scans, supine_patient_record *record,
                                          supine_error *error);
 
-/** Fit the displacement law to ordered scans.
+/** Fit the displacement law to ordered scans. Warn if their surfaces differ no more than those of
+ * one scan do.
  * @param options        `gravity` and `path_span` are taken from the record
  * @param expandability  as supine_patient_fit_surface */
-supine_status supine_patient_scans_fit(const supine_patient_scans *scans,
+supine_status supine_patient_scans_fit(supine_patient_scans *scans,
                                        const supine_patient_fit_options *options,
                                        bool expandability, supine_patient_record *record,
                                        supine_error *error);
@@ -46,8 +47,8 @@ supine_status supine_patient_scans_fit_further_landmarks(
     supine_patient_pairs *pairs, supine_patient_record *record, supine_error *error);
 
 /** Fit the surface of a further scan by supine_patient_gain_fit_surface, and append the result to
- * the record. Warn in scans->findings if the further scan hardly is of the same person as the scan in
- * the same posture. Call supine_patient_scans_fit first. */
+ * the record. Warn in scans->findings if the further scan hardly is of the same person as the scan
+ * in the same posture. Call supine_patient_scans_fit first. */
 supine_status supine_patient_scans_fit_further_surface(supine_patient_scans *scans,
                                                        const supine_state *state, bool scans_moved,
                                                        const supine_lungs *scan,

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include <gsl/gsl_statistics.h>
+#include <supine/inputs.h>
 
 #include "precompute/patient/matching.h"
 
@@ -18,7 +19,6 @@ enum {
 static const double converged = 2e-3;     /* RMS movement of the vertices, mm, that ends the fit */
 static const double size_converged = 0.5; /* movement, mm, that ends the fit of the size only */
 static const double scale_least = 1.0;    /* lower bound on the distances' robust deviation, mm */
-static const double same_state = 0.02;    /* surfaces closer than this (RMS, mm) are equal */
 
 /* Set the measurement of each vertex to a first guess: its displacement along one axis by the
  * affine map from the bounding box of the fuller surface to that of the emptier one. */
@@ -84,7 +84,8 @@ static supine_status check_apart(supine_patient_matching *m, supine_patient_surf
   const size_t stride = sizeof *m->match / sizeof(double);
   report->before =
       sqrt(gsl_stats_tss_m(&m->match->distance, stride, m->count, 0.0) / (double)m->count);
-  SUPINE_REFUSE_IF(!(report->before >= same_state), error, SUPINE_ERROR_MESH,
+  const supine_input_verdict verdict = supine_input_judge(SUPINE_INPUT_SCANS_APART, report->before);
+  SUPINE_REFUSE_IF(verdict == SUPINE_INPUT_REFUSED, error, SUPINE_ERROR_MESH,
                    "the two surfaces are the same (%s mm RMS apart): give two different states",
                    supine_text_distance(report->before).text);
   return SUPINE_OK;

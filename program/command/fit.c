@@ -201,8 +201,8 @@ static supine_status run(void *chosen, const supine_arguments *given, supine_err
   memcpy(record.state, wanted->state, sizeof record.state);
   SUPINE_TRY(supine_patient_scans_order(&scans, &record, error));
   supine_options_say_findings(name, &scans.findings);
+  scans.findings.count = 0; /* said */
   SUPINE_TRY(supine_patient_scans_fit(&scans, &options, wanted->expandability, &record, error));
-  scans.findings.count = 0; /* said above */
   for (size_t k = 0; k < wanted->further_count; ++k) {
     SUPINE_TRY(fit_further(wanted, k, &scans, &record, error));
   }

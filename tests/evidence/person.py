@@ -10,12 +10,14 @@ stand for lungs: their spread is measured. LOBES are label maps of further peopl
 their spread (precompute/patient/checks.c); the deviation of each own pair of scans from the lines of the others; how
 many pairs of two people deviate by more than the limit of docs/inputs.md from the lines of the rest; the same of own
 pairs that are scaled to a child's size, of single lungs, of pairs without the lower part of one lung, and of scans that
-are thicker than they were; and the share of landmarks more than 5 mm outside the lungs of the same and of other people.
+are thicker than they were; the distance of two surfaces of one scan, and of two states; and the share of landmarks more
+than 5 mm outside the lungs of the same and of other people.
 Exit code 77: no data."""
 import glob
 import itertools
 import json
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -143,6 +145,27 @@ def compare(bases, people, quiet, further):
     print(f"two people ({len(people)} and {len(further)}): {above} of {len(wrong)} above {LIMIT} SD")
 
 
+def apart(run, folder, scans):
+    """Print the RMS distance, mm, of surfaces of 3 and 6 mm edge of a scan, and of one and its state 3 % of full
+    inflation below."""
+    def distance(scan, other, state):
+        found = run("fit", scan, other, "--rest", state, "--other", "supine:full", "-o", "fit.json")
+        return float(re.search(r"distance before the fit, RMS, mm +(\S+)", found)[1])
+    found = []
+    for path, words in scans:
+        for name, edge in (("fine", 3), ("coarse", 6)):
+            run("precompute", os.path.abspath(path), *words, "--edge", edge, "--band", 3, "--held-out", 5,
+                "--surfaces-out", f"{name}.ply", "-o", "basis.safetensors")
+        basis = tensors(folder + "/basis.safetensors")
+        state = f"supine:full-{0.03 * measure(basis)[0]:.0f}"
+        run("deform", "basis.safetensors", "--posture", state, "-o", "state.ply")
+        found.append([distance(f"{first}.ply", f"{second}.ply", state) for first, second in
+                      (("fine", "coarse"), ("coarse", "fine"), ("state", "coarse"))])
+    titles = ("one scan, fine and coarse", "one scan, coarse and fine", "states 3 % apart")
+    for title, values in zip(titles, zip(*found)):
+        print(f"{title}: {min(values):.2f} to {max(values):.2f} mm apart, {len(values)} people")
+
+
 def main(build, copd, quiet, *lobes):
     supine = os.path.abspath(os.path.join(build, "supine"))
     people = sorted(os.path.basename(path)[:-4] for path in glob.glob(copd + "/case*.csv"))
@@ -150,7 +173,8 @@ def main(build, copd, quiet, *lobes):
         sys.exit(77)
     with tempfile.TemporaryDirectory() as folder:
         def run(*words):
-            subprocess.run([supine, *words], check=True, capture_output=True, cwd=folder)
+            return subprocess.run([supine, *map(str, words)], check=True, capture_output=True, text=True,
+                                  cwd=folder).stdout
 
         def outside(points, basis):
             np.savetxt(folder + "/points.csv", points, "%.3f", ",", header="x,y,z", comments="")
@@ -167,6 +191,8 @@ def main(build, copd, quiet, *lobes):
                  for p, s in itertools.product(people, ("exp", "insp"))}
         bases.update({(path, ""): basis(path, "further.safetensors", "--labels", "lobes") for path in lobes})
         compare(bases, people, sorted(glob.glob(os.path.abspath(quiet) + "/case*.csv")), lobes)
+        apart(run, folder, [(f"{copd}/{p}_insp.nii.gz", ()) for p in people] +
+              [(path, ("--labels", "lobes")) for path in lobes])
         for state, columns in (("exp", slice(0, 3)), ("insp", slice(3, 6))):
             marks = {p: np.genfromtxt(f"{copd}/{p}.csv", delimiter=",", skip_header=1)[:, columns] for p in people}
             share = np.array([[outside(marks[p], f"{q}_{state}.safetensors") for p in people] for q in people])
