@@ -21,8 +21,7 @@ size_t supine_image_voxel_size(supine_image_voxel voxel) {
 }
 
 size_t supine_image_bytes(const supine_image *image) {
-  return image->size[0] * image->size[1] * image->size[2] * image->channels *
-         supine_image_voxel_size(image->voxel);
+  return supine_image_count(image) * image->channels * supine_image_voxel_size(image->voxel);
 }
 
 double supine_image_get(const supine_image *image, size_t index) {
@@ -190,7 +189,7 @@ void supine_image_reverse(supine_image *image, size_t axis) {
     return;
   }
   unsigned char *bytes = image->values;
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     const size_t at = i / stride % image->size[axis];
     if (2 * at < last) {
       swap_bytes(bytes + i * each, bytes + (i + (last - 2 * at) * stride) * each, each);

@@ -43,6 +43,11 @@ typedef struct supine_image {
   bool frames_differ; /**< whether a NIfTI file's qform and sform differ by half a voxel or more */
 } supine_image;
 
+/** Return the number of voxels. */
+static inline size_t supine_image_count(const supine_image *image) {
+  return image->size[0] * image->size[1] * image->size[2];
+}
+
 /** Return whether the name ends in .nrrd, .nii, .nii.gz or .mha. */
 bool supine_image_supports(const char *path);
 

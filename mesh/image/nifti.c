@@ -220,7 +220,7 @@ static void make_header(const supine_image *image, const char *note, unsigned ch
  * stay in LPS: ITK and ANTs do not convert NIFTI_INTENT_VECTOR, and ITK before 5.3 reads only the
  * first component of NIFTI_INTENT_DISPVECT. */
 static float *planes(const supine_image *image, supine_arena *arena) {
-  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  const size_t count = supine_image_count(image);
   float *made = supine_arena_take(arena, 3 * count, sizeof *made);
   if (made != NULL) {
     for (size_t i = 0; i < 3 * count; ++i) {

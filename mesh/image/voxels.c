@@ -113,7 +113,7 @@ static supine_status rescale(const char *path, const image_storage *storage, sup
       (slope == 1.0 && intercept == 0.0)) {
     return SUPINE_OK;
   }
-  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  const size_t count = supine_image_count(image);
   float *values = malloc(count * sizeof *values);
   if (values == NULL) {
     return supine_error_memory(error, "%zu voxels of %s", count, path);
@@ -244,7 +244,7 @@ supine_status supine_image_read_voxels(const char *path, FILE *file, size_t file
                    "%s: %zu x %zu x %zu voxels do not fit in %zu bytes: the file is truncated; "
                    "fetch or write it again",
                    path, image->size[0], image->size[1], image->size[2], file_size);
-  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  const size_t count = supine_image_count(image);
   image->values = malloc(count * each);
   if (image->values == NULL) {
     return supine_error_memory(error, "%zu voxels of %s", count, path);

@@ -51,7 +51,7 @@ static supine_status read_image(const work *w, const char *path, supine_image *i
 /* Join masks into one map with the labels 1, 2, ... Where masks overlap, the first one counts. */
 static supine_status join_images(work *w, const char *const *paths, size_t count,
                                  supine_error *error) {
-  const size_t voxels = w->image.size[0] * w->image.size[1] * w->image.size[2];
+  const size_t voxels = supine_image_count(&w->image);
   const supine_image first = w->image;
   uint8_t *joined = calloc(voxels, 1);
   SUPINE_FREED_BY(supine_image_free) supine_image image = first;

@@ -41,7 +41,7 @@ typedef struct voxels {
 
 static voxels inspect(const supine_image *image) {
   voxels found = {.labels = true, .probabilities = true};
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     const double value = supine_image_get(image, i);
     if (!is_label(value)) {
       found.other = found.labels ? value : found.other;
@@ -69,7 +69,7 @@ supine_status supine_labels_settle(const char *path, supine_image *image, supine
   if (image->voxel != SUPINE_VOXEL_F32 && image->voxel != SUPINE_VOXEL_F64) {
     return SUPINE_OK;
   }
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     const double value = supine_image_get(image, i);
     const double share = value >= threshold ? 1.0 : 0.0;
     const double label = found.labels ? rint(value) : share;
@@ -119,8 +119,9 @@ supine_status supine_labels_count(const char *path, const supine_image *image, l
     read_row(image, row, labels);
     count_row(image, row, labels, tally);
   }
-  SUPINE_REFUSE_IF(tally[0].count == image->size[0] * image->size[1] * image->size[2], error,
-                   SUPINE_ERROR_MESH, "%s: every voxel is 0: give an image with labels", path);
+  const size_t count = supine_image_count(image);
+  SUPINE_REFUSE_IF(tally[0].count == count, error, SUPINE_ERROR_MESH,
+                   "%s: every voxel is 0: give an image with labels", path);
   return SUPINE_OK;
 }
 

@@ -152,7 +152,7 @@ static void search_rows(void *context, size_t begin, size_t end, size_t thread) 
 
 static supine_status take_nodes(const supine_image *grid, const unsigned char *keep,
                                 supine_inside_content *content, supine_error *error) {
-  const size_t nodes = grid->size[0] * grid->size[1] * grid->size[2];
+  const size_t nodes = supine_image_count(grid);
   size_t count = 0;
   size_t inside = 0;
   for (size_t i = 0; i < nodes; ++i) {
@@ -186,7 +186,7 @@ supine_status supine_inside_content_grid(const supine_inside_shells *shells,
   SUPINE_TRY(make_grid(shells, like, spacing, margin, &grid, error));
   content->unseen = like != NULL ? find_unseen(shells, like) : 0.0;
   const double diagonal = supine_image_cell_diagonal(&grid);
-  const size_t nodes = grid.size[0] * grid.size[1] * grid.size[2];
+  const size_t nodes = supine_image_count(&grid);
   SUPINE_ARENA arena = {0};
   search work = {shells, &grid, diagonal, supine_arena_take(&arena, nodes, 1)};
   SUPINE_TRY(supine_arena_check(&arena, error, "a grid of %zu nodes", nodes));

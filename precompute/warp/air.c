@@ -117,7 +117,7 @@ static void smooth(const supine_image *bins, float *values, float *spare) {
   double weight[REACH + 1];
   float *from = values;
   float *to = spare;
-  const size_t count = bins->size[0] * bins->size[1] * bins->size[2] * bins->channels;
+  const size_t count = supine_image_count(bins) * bins->channels;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double step = supine_image_plane_distance(bins, axis) / deviation; /* in SDs */
     const size_t reach = (size_t)fmin(ceil(3.0 / step), REACH);
@@ -140,7 +140,7 @@ static void smooth(const supine_image *bins, float *values, float *spare) {
 static void divide(const sums *total, supine_image *air, const float *weight) {
   static const double least = 1e-3;
   float *density = air->values;
-  for (size_t i = 0; i < air->size[0] * air->size[1] * air->size[2] * air->channels; ++i) {
+  for (size_t i = 0; i < supine_image_count(air) * air->channels; ++i) {
     const size_t lung = i % air->channels;
     const double mean = total->count[lung] > 0.0 ? total->air[lung] / total->count[lung] : 0.0;
     density[i] = (float)(((double)density[i] + least * mean) / ((double)weight[i] + least));
@@ -168,7 +168,7 @@ supine_status supine_warp_tissue_find_air(const supine_image *ct, supine_tissue 
   binning work = {.ct = ct, .tissue = tissue};
   supine_image *air = &tissue->air;
   choose_bins(ct, tissue->lungs, work.bin, air);
-  const size_t count = air->size[0] * air->size[1] * air->size[2] * tissue->lungs;
+  const size_t count = supine_image_count(air) * tissue->lungs;
   SUPINE_ARENA arena = {0};
   float *spare = supine_arena_take(&arena, count, sizeof *spare);
   work.weight = supine_arena_zeros(&arena, count, sizeof *work.weight);

@@ -67,7 +67,7 @@ static bool look(const supine_image *image, const double point[3], double *value
 }
 
 static void look_at_nodes(const supine_image *depth, const supine_image *image, sight *s) {
-  for (size_t i = 0; i < depth->size[0] * depth->size[1] * depth->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(depth); ++i) {
     double point[3];
     double value;
     if (!(supine_image_get(depth, i) > rim)) {
@@ -155,7 +155,7 @@ static supine_status check_labels(const supine_field *field, const supine_image 
   SUPINE_ARENA arena = {0};
   labelled *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
   SUPINE_TRY(supine_arena_check(&arena, error, "%d labels", (int)LABELS));
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     const double label = supine_image_get(image, i);
     double point[3];
     double depth = 0.0;
@@ -193,7 +193,7 @@ static supine_status check_no_labels(const supine_image *image, const char *path
   bool *found = supine_arena_zeros(&arena, LABELS, sizeof *found);
   size_t count = 0;
   SUPINE_TRY(supine_arena_check(&arena, error, "%d labels", (int)LABELS));
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     const double value = supine_image_get(image, i);
     if (!(value >= 0.0 && value < LABELS && value == rint(value))) {
       return SUPINE_OK;

@@ -141,7 +141,7 @@ static void smooth(supine_image *nodes, const float *depth, double near) {
 static double largest_near(const supine_image *nodes, const float *depth, double near) {
   const float *u = nodes->values;
   double square = 0.0;
-  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(nodes); ++i) {
     const double v[3] = {(double)u[3 * i], (double)u[3 * i + 1], (double)u[3 * i + 2]};
     square = (double)depth[i] >= -near ? fmax(square, supine_dot(v, v)) : square;
   }
@@ -152,7 +152,7 @@ void supine_warp_fade_out(supine_field *field, const unsigned char *known) {
   supine_image *nodes = &field->nodes;
   float *u = nodes->values;
   float *depth = field->depth.values;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  const size_t count = supine_image_count(nodes);
   const double near = supine_image_cell_diagonal(nodes);
   double height[3];
   for (size_t a = 0; a < 3; ++a) {

@@ -126,7 +126,7 @@ supine_status supine_warp_create(const supine_basis *basis, const supine_pose *p
   const uint32_t *part = NULL;
   const float *depth = NULL;
   SUPINE_TRY(read_grid(basis, &made.nodes, &part, &depth, error));
-  const size_t count = made.nodes.size[0] * made.nodes.size[1] * made.nodes.size[2];
+  const size_t count = supine_image_count(&made.nodes);
   SUPINE_ARENA arena = {0};
   float *moved = supine_arena_take(&arena, 3 * n, sizeof *moved);
   unsigned char *known = supine_arena_zeros(&arena, count, 1);

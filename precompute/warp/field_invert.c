@@ -121,7 +121,7 @@ static void measure(const supine_field *field, const supine_field *inverse,
   const float *u = nodes->values;
   size_t count = 0;
   double sum = 0.0;
-  for (size_t node = 0; node < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++node) {
+  for (size_t node = 0; node < supine_image_count(nodes); ++node) {
     if (!(((const float *)field->depth.values)[node] > 0.0F)) {
       continue;
     }
@@ -146,7 +146,7 @@ static void measure(const supine_field *field, const supine_field *inverse,
 supine_status supine_warp_invert(const supine_field *field, supine_field *inverse,
                                  supine_warp_residual *residual, supine_error *error) {
   const supine_image *nodes = &field->nodes;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  const size_t count = supine_image_count(nodes);
   supine_field made = {.nodes = *nodes};
   SUPINE_ARENA arena = {0};
   unsigned char *lost = supine_arena_take(&arena, count, 1);

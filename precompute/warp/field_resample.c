@@ -381,7 +381,7 @@ static supine_status resample_densities(resampling *work, supine_error *error) {
 supine_status supine_warp_resample(const supine_field *inverse, const supine_tissue *tissue,
                                    bool labels, const supine_image *image, supine_image *moved,
                                    supine_error *error) {
-  const size_t count = image->size[0] * image->size[1] * image->size[2];
+  const size_t count = supine_image_count(image);
   const bool densities = tissue != NULL && tissue->kind.values != NULL;
   resampling work = {.inverse = inverse,
                      .tissue = densities ? tissue : NULL,
@@ -413,7 +413,7 @@ supine_status supine_warp_resample(const supine_field *inverse, const supine_tis
 }
 
 bool supine_warp_is_hounsfield(const supine_image *image) {
-  for (size_t i = 0; i < image->size[0] * image->size[1] * image->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(image); ++i) {
     if (supine_image_get(image, i) < supine_warp_aerated) {
       return true;
     }

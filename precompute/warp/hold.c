@@ -72,7 +72,7 @@ static fit fit_motion(const supine_tissue *tissue, size_t group, const supine_fi
   for (int step = MEANS; step < STEPS; ++step) {
     for (size_t p = 0; p < tissue->part_count; ++p) {
       const supine_image *mask = &tissue->parts[p].mask;
-      const size_t voxels = mask->size[0] * mask->size[1] * mask->size[2];
+      const size_t voxels = supine_image_count(mask);
       if (tissue->parts[p].group != group) {
         continue;
       }
@@ -191,7 +191,7 @@ static bool changed_cell(const supine_image *nodes, const float *weight, size_t 
 /* Count the changed cells that the inverse field folds. */
 static size_t count_folds(const supine_image *nodes, const float *weight) {
   size_t folded = 0;
-  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(nodes); ++i) {
     supine_warp_cell cell;
     if (changed_cell(nodes, weight, i, &cell)) {
       folded += supine_warp_stretch(nodes, &cell) > 0.0 ? 0 : 1;
@@ -230,7 +230,7 @@ static void add_volumes(const supine_field *field, double sign, double *volume) 
   const supine_image *nodes = &field->nodes;
   const double whole = supine_warp_tissue_voxel(nodes);
   const double reach = supine_image_cell_diagonal(nodes); /* corners differ in depth by less */
-  for (size_t i = 0; i < nodes->size[0] * nodes->size[1] * nodes->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(nodes); ++i) {
     const supine_warp_cell cell = {{i % nodes->size[0], i / nodes->size[0] % nodes->size[1],
                                     i / nodes->size[0] / nodes->size[1]},
                                    {0.5, 0.5, 0.5}};
@@ -253,7 +253,7 @@ supine_status supine_warp_tissue_hold(const supine_tissue *tissue, supine_field 
   static const double width_least = 10.0; /* of the transition, mm: two cells of 5 mm */
   static const double per_misfit = 4.0;
   const supine_image *nodes = &inverse->nodes;
-  const size_t count = nodes->size[0] * nodes->size[1] * nodes->size[2];
+  const size_t count = supine_image_count(nodes);
   *held = (supine_warp_tissue_held){0};
   if (tissue->part_count == 0) {
     return SUPINE_OK;

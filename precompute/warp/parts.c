@@ -206,7 +206,7 @@ static bool make_mask(const search *s, supine_image *mask) {
   for (size_t a = 0; a < 3; ++a) {
     mask->size[a] = high[a] - low[a] + 1;
   }
-  unsigned char *in = calloc(mask->size[0] * mask->size[1] * mask->size[2], 1);
+  unsigned char *in = calloc(supine_image_count(mask), 1);
   mask->values = in;
   if (in == NULL) {
     return false;
@@ -239,7 +239,7 @@ static bool is_outline(const supine_image *mask, size_t voxel) {
 /* Collect the centres of voxels at the surface of a part, evenly thinned. */
 static bool make_outline(supine_warp_part *part) {
   const supine_image *mask = &part->mask;
-  const size_t count = mask->size[0] * mask->size[1] * mask->size[2];
+  const size_t count = supine_image_count(mask);
   size_t found = 0;
   for (size_t i = 0; i < count; ++i) {
     found += ((const unsigned char *)mask->values)[i] == 1 && is_outline(mask, i) ? 1 : 0;
@@ -309,7 +309,7 @@ static bool fill_cavities(supine_image *mask) {
   if (!mark_outside(mask)) {
     return false;
   }
-  for (size_t i = 0; i < mask->size[0] * mask->size[1] * mask->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(mask); ++i) {
     in[i] = in[i] == 2 ? 0 : 1;
   }
   return true;
@@ -319,7 +319,7 @@ static bool fill_cavities(supine_image *mask) {
 static bool measure(supine_warp_part *part) {
   const supine_image *mask = &part->mask;
   const unsigned char *in = mask->values;
-  const size_t count = mask->size[0] * mask->size[1] * mask->size[2];
+  const size_t count = supine_image_count(mask);
   double square[3][3] = {{0.0}};
   double at[3];
   for (size_t i = 0; i < count; ++i) {
@@ -442,7 +442,7 @@ static bool find_labelled(search *s, const supine_image *depth) {
 
 supine_status supine_warp_tissue_find_labels(const supine_field *field, const supine_image *labels,
                                              supine_tissue *tissue, supine_error *error) {
-  const size_t voxels = labels->size[0] * labels->size[1] * labels->size[2];
+  const size_t voxels = supine_image_count(labels);
   SUPINE_ARENA arena = {0};
   unsigned char *stage = supine_arena_zeros(&arena, voxels, 1);
   SUPINE_TRY(supine_arena_check(&arena, error, "a label map of %zu voxels", voxels));

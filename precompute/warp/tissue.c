@@ -95,7 +95,7 @@ static void find_spans(const supine_image *depth, double outer, const supine_ima
       reach[a] += fabs(voxel[a]);
     }
   }
-  for (size_t i = 0; i < depth->size[0] * depth->size[1] * depth->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(depth); ++i) {
     if ((double)((const float *)depth->values)[i] > -outer) {
       double at[3];
       supine_image_place(depth, i, at);
@@ -169,7 +169,7 @@ supine_status supine_warp_tissue_find(const supine_field *field, const supine_im
   if (tissue->kind.values == NULL || tissue->span == NULL) {
     return supine_error_memory(error, "an image of %zu voxels", ct->size[0] * rows);
   }
-  for (size_t i = 0; i < field->lung.size[0] * field->lung.size[1] * field->lung.size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(&field->lung); ++i) {
     tissue->lungs = lung[i] >= tissue->lungs ? lung[i] + 1U : tissue->lungs;
   }
   mark(field, ct, tissue);

@@ -105,7 +105,7 @@ supine_status supine_warp_ventilated_labels(const supine_image *ventilation,
   const float *values = ventilation->values;
   const double size = voxel_volume(labels);
   *count = 0;
-  for (size_t i = 0; i < labels->size[0] * labels->size[1] * labels->size[2]; ++i) {
+  for (size_t i = 0; i < supine_image_count(labels); ++i) {
     const double label = supine_image_get(labels, i);
     if (label != 0.0 && !isnan(values[i])) {
       supine_ventilated *part = find_part(parts, count, label);
