@@ -302,6 +302,57 @@ static void clock_samples(const supine_basis *basis, const supine_state *state, 
   free(more);
 }
 
+/* Time the covariances of points inside lungs whose law was fitted to landmarks, against preparing
+ * the field. */
+static void clock_covariance(void) {
+  enum { VERTICES = 6000, LANDMARKS = 150, POINTS = 300, REPEATS = 5 };
+  static const double resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
+  static float landmarks[4 * LANDMARKS];
+  static float share[VERTICES];
+  static supine_doubt_point points[POINTS];
+  static double covariance[9 * POINTS * POINTS];
+  fixture *f = fixture_create_shrinking(VERTICES, 16, 5);
+  for (size_t i = 0; i < VERTICES; ++i) {
+    share[i] = 1;
+  }
+  for (size_t i = 0; i < LANDMARKS; ++i) {
+    const size_t vertex = i * (VERTICES / LANDMARKS);
+    memcpy(landmarks + 4 * i, f->vertex + 3 * vertex, 3 * sizeof *landmarks);
+    landmarks[4 * i + 3] = (float)f->lung[vertex];
+  }
+  for (size_t i = 0; i < POINTS; ++i) {
+    points[i].vertex = i * (VERTICES / POINTS);
+  }
+  f->resting = resting;
+  f->error_share = share;
+  f->landmarks = landmarks;
+  f->landmark_count = LANDMARKS;
+  size_t size = 0;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  fixture_destroy(f);
+  supine_basis *basis = NULL;
+  supine_error error;
+  need(supine_basis_open_memory(bytes, size, &basis, &error), &error);
+  const supine_state state = {.gravity = {1, 0, 0}, .volume = {SUPINE_VOLUME_REST, 300}};
+  const supine_doubt_task task = {.basis = basis, .state_count = 1, .states = &state};
+  double *space = malloc(supine_doubt_space(basis, 1) * sizeof *space);
+  double least[2] = {INFINITY, INFINITY};
+  for (int k = 0; k < REPEATS; ++k) {
+    const supine_doubt *doubt = NULL;
+    const double begin = supine_clock_seconds();
+    need(supine_doubt_prepare(&task, space, &doubt, &error), &error);
+    const double middle = supine_clock_seconds();
+    need(supine_doubt_covariance(doubt, POINTS, points, NULL, covariance, &error), &error);
+    least[0] = fmin(least[0], middle - begin);
+    least[1] = fmin(least[1], supine_clock_seconds() - middle);
+  }
+  (void)printf("covariance of %d points given %d landmarks: %.1f ms, %.1f times the preparation\n",
+               POINTS, LANDMARKS, 1e3 * least[1], least[1] / least[0]);
+  free(space);
+  supine_basis_close(basis);
+  free(bytes);
+}
+
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
   static const double resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
@@ -391,5 +442,6 @@ int main(int argc, char **argv) {
                  central == 1 ? "central" : "random", "both", mean[0], mean[1], mean[2], mean[3]);
   }
   clock_library();
+  clock_covariance();
   return EXIT_SUCCESS;
 }
