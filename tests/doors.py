@@ -100,6 +100,12 @@ def write_segmentation(name, image):
                        shift=image.get("shift", 0.0))
 
 
+def write_lines(name, rows):
+    """Write lines of sight, each from its last three numbers through its first three."""
+    write_text(name, "name,x,y,z,from_x,from_y,from_z\n" + "".join(
+        f"p{i}," + ",".join(f"{x:.4f}" for x in row) + "\n" for i, row in enumerate(rows)))
+
+
 def write_text(name, text):
     with open(name, "w", encoding="utf-8") as file:
         file.write(text)
@@ -138,6 +144,11 @@ def named(points):
     return [("p%d" % i, *p) for i, p in enumerate(points)]
 
 
+def lesion(centre, factor=3):
+    """Return a stiff ball of 20 mm, which reaches the surface."""
+    return ",".join(f"{x:.1f}" for x in (*centre, 20, factor))
+
+
 label, ct = voxels_of(grid), None
 ct = with_part(label, values=np.where(label["values"] > 0, -850, 40).astype(np.int16))
 dose = with_part(label, values=np.full(label["values"].shape, 2, np.float32))
@@ -167,6 +178,8 @@ with open("other_patient.json", encoding="utf-8") as file:
     other_patient = file.read()
 first_number = re.search(r"-?\d+\.\d{4,}", patient)[0]
 person = at(other, STATE) * [0.8, 1, 1.2], other.triangles
+places = np.array([[0, -900, 0], [900, 0, 0]])[np.arange(len(observed)) % 2] + observed.mean(axis=0)
+sights = np.column_stack([places + 1.3 * (observed - places), places])
 small = 0.02 * (surface[0] - middle) + within[0]
 columns = lambda scale: np.tile(scale, 2)
 MISTAKES = {
@@ -240,6 +253,19 @@ MISTAKES = {
         "mirror": named(observed * FLIP), "person": named(observed * [1.3, 0.75, 0.8]),
         "shifted": named(np.roll(observed, 1, axis=0)), "repeated": [("p0", *p) for p in observed],
         "range": named(with_first(observed, 1e7)), "finite": named(with_first(observed, np.nan)), "cut": None}),
+    "registered": (write_points, ".csv", {  # points of a basis, at which its lungs are registered
+        RIGHT: named(within[::9]), "unit": named(within[::9] / 1000), "axes": named(within[::9] * RAS),
+        "mirror": named(within[::9] * FLIP), "shifted": named(within[::9] + [0, 0, 60]),
+        "repeated": named(np.tile(within[:1], (5, 1))), "range": named(with_first(within[::9], 1e7)),
+        "finite": named(with_first(within[::9], np.nan)), "cut": None}),
+    "lines": (write_lines, ".csv", {  # of sight, from two places
+        RIGHT: sights, "unit": sights / 1000, "axes": sights * columns(RAS), "mirror": sights * columns(FLIP),
+        "shifted": np.column_stack([np.roll(sights[:, :3], 1, axis=0), sights[:, 3:]]),
+        "repeated": np.tile(sights[:, 3:], 2), "range": with_first(sights, 1e7),
+        "finite": with_first(sights, np.nan), "cut": None}),
+    "lesion": (None, "", {RIGHT: lesion(within[0]), "unit": lesion(within[0] / 1000), "axes": lesion(within[0] * RAS),
+                          "shifted": lesion(within[0] + [0, 0, 400]), "range": lesion(within[0], -3),
+                          "finite": lesion(within[0], np.nan), "cut": lesion(within[0])[:-4]}),
     "patient": (write_text, ".json", {
         RIGHT: patient, "person": other_patient, "range": patient.replace(first_number, "1e30", 1),
         "finite": patient.replace(first_number, "NaN", 1), "cut": None}),
@@ -411,6 +437,14 @@ DOORS = [
     ("VOLUME", "stream", "volume", lambda x: stream("lungs.st", message=volume_text(x))),
     ("locate OBSERVED", "command", "observed",
      lambda x: command("locate", "lungs.st", x, "--points", "inside.st", "--posture", "supine", "-o", "out.vtp")),
+    ("locate LINES", "command", "lines",
+     lambda x: command("locate", "lungs.st", x, "--points", "inside.st", "--posture", "supine", "-o", "out.vtp")),
+    ("deform --frame", "command", "registered",
+     lambda x: command("deform", "inside.st", "--posture", "prone", "--frame", x, "-o", "out.csv")),
+    ("compare --frame", "command", "registered",
+     lambda x: command("compare", "inside.st", "--postures", "supine,prone", "--frame", x)),
+    ("precompute --lesion", "command", "lesion",
+     lambda x: command("precompute", "full.ply", "--lesion", x, *QUICK, "-o", "out.st")),
     ("locate()", "Python", "observed",
      lambda x: None if "repeated" in x else  # it takes no names
      python(lambda: inside.locate(ROWS_INSIDE, np.loadtxt(x, delimiter=",", skiprows=1, usecols=(1, 2, 3))))),
