@@ -64,8 +64,7 @@ static supine_status refuse(size_t missing, size_t threads, supine_error *error)
       needed, threads, plural, fewer);
   return supine_error_set(error, SUPINE_ERROR_MEMORY,
                           "OpenBLAS needs another %zu MiB of addresses for %zu thread%s, and the "
-                          "limit of the process is "
-                          "%llu MiB: raise it (ulimit -v)%s",
+                          "limit of the process is %llu MiB: raise it (ulimit -v)%s",
                           needed, threads, plural, (unsigned long long)(addresses.rlim_cur >> 20),
                           fewer);
 }

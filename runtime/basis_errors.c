@@ -102,9 +102,7 @@ static supine_status check_landmarks(const supine_check *c, supine_basis *basis)
     basis->held_out = text == NULL ? 0 : supine_number_parse(text, NULL);
     if (basis->landmark_count > SUPINE_KRIGING_LANDMARKS_MAX || !(basis->held_out > 0)) {
       return supine_check_refuse(
-          c,
-          "it has %zu landmarks, more than %d, or no share at points that were held "
-          "out",
+          c, "it has %zu landmarks, more than %d, or no share at points that were held out",
           basis->landmark_count, (int)SUPINE_KRIGING_LANDMARKS_MAX);
     }
     for (size_t i = 0; i < 4 * basis->landmark_count; ++i) {

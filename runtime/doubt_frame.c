@@ -149,8 +149,7 @@ supine_status supine_doubt_frame_prepare(const supine_doubt *doubt, size_t count
   if (doubt->location != NULL) {
     return supine_error_set(
         error, SUPINE_ERROR_UNSUPPORTED,
-        "located lungs are in the frame of the observations: they have no other "
-        "registration");
+        "located lungs are in the frame of the observations: they have no other registration");
   }
   *f = (supine_doubt_frame){.doubt = doubt, .count = count, .white = space + struct_space(count)};
   for (size_t i = 0; i < count; ++i) {

@@ -95,8 +95,8 @@ static supine_status check(const supine_locate_task *task, supine_error *error) 
     if (o->vertex >= n || !supine_sight_valid(o) || !(o->noise > 0) || !isfinite(o->noise)) {
       return supine_error_set(error, SUPINE_ERROR_ARGUMENT,
                               "observation %zu has vertex %zu: give a vertex below %zu, a finite "
-                              "position, a noise above "
-                              "0, and for a line two finite positions that differ",
+                              "position, a noise above 0, and for a line two finite positions that "
+                              "differ",
                               j + 1, o->vertex, n);
     }
   }

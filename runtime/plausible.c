@@ -77,8 +77,7 @@ static bool plausible_modes(const supine_basis *basis, char *detail, size_t size
   if (!(weight <= largest_weight) || !(moved <= largest_move_mm)) {
     (void)supine_print_text(
         detail, size,
-        "modes have weights of up to %g and displacements of up to %g mm, more than %g "
-        "and %g mm",
+        "modes have weights of up to %g and displacements of up to %g mm, more than %g and %g mm",
         weight, moved, largest_weight, largest_move_mm);
     return false;
   }

@@ -62,11 +62,9 @@ static const supine_option table[] = {
      "write N plausible lungs to -o FILE.safetensors instead of the computed one: all vertices, "
      "positions [N, vertices, 3] in mm and LPS. They are drawn from the expected error, points "
      "near each other with errors alike, and every sample of a surface or a grid has the volumes "
-     "of "
-     "the state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % sure. "
-     "Samples of points inside the lungs have no surface, and their volumes are not exact. "
-     "Embedded points are in the order in which they were embedded. Equal options make equal "
-     "files",
+     "of the state. Plan on them as on the computed lungs: what holds in 95 % of them is 95 % "
+     "sure. Samples of points inside the lungs have no surface, and their volumes are not exact. "
+     "Embedded points are in the order in which they were embedded. Equal options make equal files",
      SUPINE_FILLS(request, samples), SUPINE_SAYS_GIVEN(request, samples_given),
      .range = {1.0, 100000.0}, .partners = "output seed posture gravity volume allow-folds"},
     {"seed", 0, "S", "number that decides the samples: another one draws other lungs",

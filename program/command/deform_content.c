@@ -40,8 +40,7 @@ const supine_option supine_command_deform_content_options[] = {
      "that is at each node in the scan, or in the state of --from. It is in mm and LPS, also in "
      "NIfTI, as ITK and ANTs expect; for NiftyReg, negate x and y. Outside the lungs it falls to 0 "
      "within 60 mm, or 1.5 times the largest displacement if that is more, and it is 0 at the "
-     "border "
-     "of the grid and beyond",
+     "border of the grid and beyond",
      SUPINE_FILLS(supine_deform_content, field), .file = SUPINE_FILE_OUT,
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"inverse", 0, NULL,
@@ -58,9 +57,9 @@ const supine_option supine_command_deform_content_options[] = {
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"image", 0, "FILE",
      "image to move and write to -o (.nrrd, .nii, .nii.gz or .mha), interpolated linearly. The "
-     "output "
-     "has the voxels of FILE in the same order, even if their axes are left-handed (as dcm2niix's "
-     "often are), so that the two can be compared voxel by voxel; fields are always right-handed",
+     "output has the voxels of FILE in the same order, even if their axes are left-handed (as "
+     "dcm2niix's often are), so that the two can be compared voxel by voxel; fields are always "
+     "right-handed",
      SUPINE_FILLS(supine_deform_content, image), .file = SUPINE_FILE_IN},
     {"density", 0, NULL,
      "with --image, if it is a CT in Hounsfield units: scale the density of aerated tissue in the "
@@ -79,8 +78,7 @@ const supine_option supine_command_deform_content_options[] = {
      .endings = ".nrrd, .nii, .nii.gz or .mha"},
     {"rigid", 0, "VALUE,...",
      "values in the label map of --labels of parts that keep their size and shape, such as "
-     "tumours, "
-     "whatever their size",
+     "tumours, whatever their size",
      SUPINE_FILLS(supine_deform_content, rigid), .read = read_rigid,
      .wants = "at most 64 values of labels, such as 7,8"},
     {.name = NULL}};

@@ -54,15 +54,13 @@ static const supine_option table[] = {
      "embed the nodes of a grid over the lungs, MM apart, for displacement fields. An image "
      "without --labels embeds a grid even without this option: nodes are centres of its voxels, "
      "continued beyond its border, and MM is rounded to a multiple of the distance between them. "
-     "The "
-     "grid reaches 60 mm past the lungs, or 1.5 times their largest displacement",
+     "The grid reaches 60 mm past the lungs, or 1.5 times their largest displacement",
      SUPINE_FILLS(request, content.grid_spacing), SUPINE_SAYS_GIVEN(request, content.has_grid),
      .standard = "4", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
     {"labels", 0, "all|N[=NAME],...",
      "read images as label maps, and embed the surface of each label N as a part with this NAME; "
      "all of several maps, or of the folder of masks that TotalSegmentator writes (its lobes), "
-     "have "
-     "the names of the files. Points and meshes may be embedded too",
+     "have the names of the files. Points and meshes may be embedded too",
      SUPINE_FILLS(request, content.labels), .read = read_labels,
      .wants =
          "all, or at most 64 labels with names of up to 31 letters, such as 7=nodule,8=vessels"},
@@ -203,12 +201,12 @@ const supine_command supine_command_embed = {
     .about =
         "Makes nodules, airways and images move with the lungs of BASIS: points (.mrk.json or "
         ".fcsv of 3D Slicer, or CSV with the columns x, y, z and name), meshes (airways, vessels, "
-        "nodules), the parts of a label map, or the nodes of a grid, which may be that of an "
-        "image (.nrrd, .nii, .nii.gz). The file is a basis: 'supine deform', 'breathe', "
-        "'compare', 'info' and 'stream' read it; 'render' and 'export' show it with --inside.\n"
+        "nodules), the parts of a label map, or the nodes of a grid, which may be that of an image "
+        "(.nrrd, .nii, .nii.gz). The file is a basis: 'supine deform', 'breathe', 'compare', "
+        "'info' and 'stream' read it; 'render' and 'export' show it with --inside.\n"
         "\n"
-        "Displacements inside are interpolated from the displacements of each lung's surface "
-        "by biharmonic splines, which are exact on the surface and for affine motion.\n"
+        "Displacements inside are interpolated from the displacements of each lung's surface by "
+        "biharmonic splines, which are exact on the surface and for affine motion.\n"
         "\n"
         "Parts that are open surfaces, or as long as a ball of a fifth of a lung, such as airways, "
         "vessels and lobes, are marked as anatomy; all others are targets.",

@@ -33,8 +33,8 @@ static const supine_option table[] = {
      ".html: a page to explore the lungs in a browser, in one file that needs no network. The "
      "basis may have up to 128 modes\n.glb: glTF 2.0 morph targets, with which any engine deforms "
      "the lungs\n.usda: an OpenUSD text file with the same targets as blend shapes, and time "
-     "samples "
-     "of breaths during a full turn; about 5000 vertices, if --simplify gives no other number",
+     "samples of breaths during a full turn; about 5000 vertices, if --simplify gives no other "
+     "number",
      SUPINE_FILLS(request, path), .required = true, .file = SUPINE_FILE_OUT,
      .endings = ".html, .glb or .usda"},
     {"breath", 0, "VOLUME",
@@ -59,8 +59,7 @@ static const supine_option table[] = {
     {"plain", 0, NULL,
      "write float32 without compression, for engines that lack EXT_meshopt_compression or "
      "KHR_mesh_quantization. three.js reads the compressed file; model-viewer refuses it unless "
-     "its "
-     "meshoptDecoderLocation is set",
+     "its meshoptDecoderLocation is set",
      SUPINE_FILLS(request, glb.plain), SUPINE_SAYS_GIVEN(request, glb_only)},
     {"animate", 0, NULL,
      "add animations of breathing: one while gravity turns from supine over the left side to prone "

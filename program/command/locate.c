@@ -39,16 +39,14 @@ static const supine_option table[] = {
      SUPINE_FILLS(request, points), .file = SUPINE_FILE_IN, .required = true},
     {"output", 'o', "FILE",
      ".vtp or .ply: the surface of the lungs; .csv, or " SUPINE_MARKUPS_ENDING
-     " of 3D Slicer: all structures in the file of --points. "
-     "Positions are in the frame of the observations, and each has its expected error. Samples are "
-     ".safetensors",
+     " of 3D Slicer: all structures in the file of --points. Positions are in the frame of the "
+     "observations, and each has its expected error. Samples are .safetensors",
      SUPINE_FILLS(request, output), .file = SUPINE_FILE_OUT, .required = true,
      .endings = ".vtp, .ply, .csv, .safetensors or " SUPINE_MARKUPS_ENDING},
     {"samples", 0, "N",
      "write N plausible places of all structures in the file of --points to -o FILE.safetensors, "
-     "as "
-     "'supine deform --samples' does. They pass near the observed points, within their noise, and "
-     "are uncertain far from them",
+     "as 'supine deform --samples' does. They pass near the observed points, within their noise, "
+     "and are uncertain far from them",
      SUPINE_FILLS(request, samples), SUPINE_SAYS_GIVEN(request, samples_given),
      .range = {1.0, 100000.0}},
     {"surface", 0, NULL,
@@ -70,8 +68,7 @@ static const supine_option table[] = {
     {"depth", 0, "MM",
      "standard deviation of how far the observations' frame is translated along the lines of sight "
      "from the frame of the scan, if all lines have one source or are parallel, and no point is "
-     "known "
-     "in space",
+     "known in space",
      SUPINE_FILLS(request, depth), .standard = "20", SUPINE_ABOVE_ZERO, SUPINE_MEASURES(LENGTH)},
     {.table = supine_options_orientation, SUPINE_FILLS(request, orientation)},
     {.table = supine_options_surface_frame, SUPINE_FILLS(request, load)},

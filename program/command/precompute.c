@@ -72,22 +72,19 @@ static const supine_option table[] = {
      "the directions of M runs; and displacement [M,P,3], the displacement of each point in each "
      "run. With a fourth tensor, run [M], each row of displacement belongs to the row of gravity "
      "with this number, or whose fourth column is this number. All are in the axes and unit of "
-     "MESH. Each vertex of MESH takes the displacement "
-     "of the point at its position, so that the points may have any order and may include inner "
-     "nodes of a volume mesh.\nRuns of one direction at several volumes: the basis has gravity and "
-     "volume, and takes any volume between the smallest and the largest that were simulated. One "
-     "run for each direction: it has gravity alone, no volumes and no breaths. Without --band and "
-     "--modes, cross-validation chooses both",
+     "MESH. Each vertex of MESH takes the displacement of the point at its position, so that the "
+     "points may have any order and may include inner nodes of a volume mesh.\nRuns of one "
+     "direction at several volumes: the basis has gravity and volume, and takes any volume between "
+     "the smallest and the largest that were simulated. One run for each direction: it has gravity "
+     "alone, no volumes and no breaths. Without --band and --modes, cross-validation chooses both",
      FILLS(model.precompute.fields), .file = SUPINE_FILE_IN, .rivals = "directions",
      .partners = "output band modes storage without-normals axes units midline labels edge close "
                  "surfaces-out scanned resting full"},
     {"storage", 0, "best|modes|clusters",
      "how the displacements of --fields are stored\nmodes: a vector for each mode and vertex, "
-     "which "
-     "costs 3 K + 3 multiplications a vertex\nclusters: vertices that move alike share vectors, "
-     "which costs 15 multiplications and 15 additions a vertex, whatever K\nbest: clusters, if "
-     "they "
-     "raise the error by half at most",
+     "which costs 3 K + 3 multiplications a vertex\nclusters: vertices that move alike share "
+     "vectors, which costs 15 multiplications and 15 additions a vertex, whatever K\nbest: "
+     "clusters, if they raise the error by half at most",
      .offset = offsetof(request, model.precompute.modes.storage), .kind = SUPINE_OPTION_CHOICE,
      .size = sizeof(supine_precompute_storage), .choices = supine_precompute_storages,
      .standard = "best",
@@ -353,11 +350,9 @@ const supine_command supine_command_precompute = {
     .about = "Solves the physics of one or two lungs for all directions of gravity, and writes a "
              "basis file. From this file, 'supine export' makes a page, and 'supine deform' and "
              "the run-time library compute deformed lungs in real time. MESH is any surface that "
-             "assimp reads (PLY, OBJ, STL, "
-             "OFF, ...), with both lungs in one file or a file for each; LABELS is the label map "
-             "of a segmentation (NRRD, NIfTI, MetaImage, or DICOM SEG, for which dcm2json of DCMTK "
-             "must be "
-             "installed). Surfaces must be closed.",
+             "assimp reads (PLY, OBJ, STL, OFF, ...), with both lungs in one file or a file for "
+             "each; LABELS is the label map of a segmentation (NRRD, NIfTI, MetaImage, or DICOM "
+             "SEG, for which dcm2json of DCMTK must be installed). Surfaces must be closed.",
     .options = table,
     .notes = "Examples:\n"
              "  supine precompute left.ply right.ply -o lungs.safetensors\n"

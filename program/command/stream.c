@@ -145,13 +145,12 @@ const supine_command supine_command_stream = {
     "follow a tracked patient live, over OpenIGTLink",
     .usage = "BASIS [--listen PORT | --connect HOST:PORT] [OPTIONS]",
     .about =
-        "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) "
-        "and sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, "
-        "QTDATA or POSITION message, or an NDARRAY of three numbers, the direction of gravity "
-        "in the marker's axes, as a tilt sensor measures it. Only the newest pose counts: a "
-        "slow peer misses frames without delaying the others. A peer that sends no message and "
-        "takes "
-        "no frame for a minute is disconnected. At the end the command prints how many frames were "
+        "Receives the pose of a tracked patient by OpenIGTLink (headers of version 1 and 2) and "
+        "sends the lungs in that pose to every connected peer. A pose is a TRANSFORM, QTDATA or "
+        "POSITION message, or an NDARRAY of three numbers, the direction of gravity in the "
+        "marker's axes, as a tilt sensor measures it. Only the newest pose counts: a slow peer "
+        "misses frames without delaying the others. A peer that sends no message and takes no "
+        "frame for a minute is disconnected. At the end the command prints how many frames were "
         "sent within 15 ms of receiving their pose.",
     .options = table,
     .notes =

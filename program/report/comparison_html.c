@@ -122,8 +122,7 @@ static json_t *values(const supine_comparison *c, json_t *traced, json_t *sliced
   json_t *today = date();
   return json_pack(
       "{s:o, s:o, s:o, s:o, s:o, s:s, s:I, s:o, s:s, s:o, s:o, s:o, s:o, s:s, s:o*, s:o*, s:o*, "
-      "s:s*, "
-      "s:s, s:o*, s:o*}",
+      "s:s*, s:s, s:o*, s:o*}",
       "provenance", provenance(c, file, today), "file", file, "title", heading, "date", today,
       "count", json_sprintf("%zu posture%s", c->postures.count, c->postures.count == 1 ? "" : "s"),
       "volume", volume, "vertices", (json_int_t)supine_basis_get_info(c->basis)->vertex_count,
