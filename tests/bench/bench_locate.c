@@ -306,7 +306,6 @@ static void clock_samples(const supine_basis *basis, const supine_state *state, 
  * the field. */
 static void clock_covariance(void) {
   enum { VERTICES = 6000, LANDMARKS = 150, POINTS = 300, REPEATS = 5 };
-  static const double resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
   static float landmarks[4 * LANDMARKS];
   static float share[VERTICES];
   static supine_doubt_point points[POINTS];
@@ -323,7 +322,7 @@ static void clock_covariance(void) {
   for (size_t i = 0; i < POINTS; ++i) {
     points[i].vertex = i * (VERTICES / POINTS);
   }
-  f->resting = resting;
+  f->resting = fixture_resting;
   f->error_share = share;
   f->landmarks = landmarks;
   f->landmark_count = LANDMARKS;
@@ -355,12 +354,11 @@ static void clock_covariance(void) {
 
 static void clock_library(void) {
   enum { VERTICES = 25000, MODES = 16, SEEN = 20, REPEATS = 30 };
-  static const double resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
   static float truth[3 * VERTICES];
   static float xyz[3 * VERTICES];
   static float sigma[VERTICES];
   fixture *f = fixture_create_shrinking(VERTICES, MODES, 5);
-  f->resting = resting;
+  f->resting = fixture_resting;
   size_t size = 0;
   unsigned char *bytes = fixture_bytes(f, &size);
   fixture_destroy(f);

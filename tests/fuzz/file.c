@@ -14,6 +14,12 @@ void supine_fuzz_expect(int sound, const char *words) {
   }
 }
 
+void supine_fuzz_expect_words(supine_status status, const supine_error *error) {
+  supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
+                                             strchr(error->message, '\n') == NULL),
+                     "an error with its status and a message of one line");
+}
+
 uint8_t *supine_fuzz_text(const char *text, size_t *size) {
   *size = strlen(text);
   uint8_t *bytes = malloc(*size + 1);

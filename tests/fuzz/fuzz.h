@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <supine/status.h>
+
 /** Read `bytes` as a file from an unknown source. Abort if the result is not valid. */
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 
@@ -25,5 +27,8 @@ uint8_t *supine_fuzz_take(const char *path, size_t *size);
 
 /** If `sound` is false, print `words`, which name what was expected, and abort. */
 void supine_fuzz_expect(int sound, const char *words);
+
+/** Abort unless a status is SUPINE_OK, or the error has this status and a message of one line. */
+void supine_fuzz_expect_words(supine_status status, const supine_error *error);
 
 #endif

@@ -13,12 +13,6 @@
 
 enum { SMALL = 1 << 15 }; /* largest number of voxels of an image that is converted */
 
-static void expect_words(supine_status status, const supine_error *error) {
-  supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
-                                             strchr(error->message, '\n') == NULL),
-                     "an error with its status and a message of one line");
-}
-
 static void expect_lungs(const char *path) {
   /* large triangles, with which the conversion is 20 times as fast */
   const supine_labels_options options = {.edge = 12.0};
@@ -27,7 +21,7 @@ static void expect_lungs(const char *path) {
   supine_error error = {0};
   const supine_status status =
       supine_labels_surfaces(&path, 1, &options, surfaces, &report, &error);
-  expect_words(status, &error);
+  supine_fuzz_expect_words(status, &error);
   for (size_t lung = 0; lung < 2; ++lung) {
     for (size_t i = 0; i < 3 * surfaces[lung].vertex_count; ++i) {
       supine_fuzz_expect(isfinite(surfaces[lung].vertices[i]), "finite coordinates of each vertex");
@@ -41,7 +35,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   supine_image image = {0};
   supine_error error = {0};
   const supine_status status = supine_image_read(path, &image, &error);
-  expect_words(status, &error);
+  supine_fuzz_expect_words(status, &error);
   if (status == SUPINE_OK) {
     const size_t count = image.size[0] * image.size[1] * image.size[2];
     double sum = 0.0;

@@ -13,27 +13,21 @@
 
 enum { VERTICES = 3 };
 
-static void expect_words(supine_status status, const supine_error *error) {
-  supine_fuzz_expect(status == SUPINE_OK || (error->status == status && error->message[0] != '\0' &&
-                                             strchr(error->message, '\n') == NULL),
-                     "an error with its status and a message of one line");
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
   const char *path = supine_fuzz_file(bytes, size, ".csv");
   supine_error error = {0};
   double a[VERTICES];
   supine_status status = supine_lungs_expandability_load(path, VERTICES, a, &error);
-  expect_words(status, &error);
+  supine_fuzz_expect_words(status, &error);
   for (size_t i = 0; status == SUPINE_OK && i < VERTICES; ++i) {
     supine_fuzz_expect(a[i] > 0.0 && isfinite(a[i]), "a positive finite expandability");
   }
   supine_pv pv;
   supine_pv_report reports[SUPINE_PV_LIMB_COUNT];
   status = supine_options_pv_fit_file(path, 0.95, &pv, reports, &error);
-  expect_words(status, &error);
+  supine_fuzz_expect_words(status, &error);
   status = supine_options_pv_load(path, &pv, &error);
-  expect_words(status, &error);
+  supine_fuzz_expect_words(status, &error);
   for (int limb = 0; status == SUPINE_OK && limb < SUPINE_PV_LIMB_COUNT; ++limb) {
     supine_fuzz_expect(supine_breath_curve_check(&pv.limb[limb], NULL) == SUPINE_OK,
                        "valid curves for inhaling and exhaling");

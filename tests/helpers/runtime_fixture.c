@@ -169,6 +169,8 @@ void fixture_add_forms(fixture *f) {
   }
 }
 
+const double fixture_resting[18] = {850 * -3.5449077018110318, [9] = 850 * -3.5449077018110318};
+
 fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed) {
   fixture *f = fixture_create(vertices, modes, 1, 2, false, false, 1, seed);
   memset(f->mode, 0, 4 * modes * sizeof *f->mode);

@@ -69,6 +69,9 @@ fixture *fixture_create(size_t vertices, size_t modes, size_t band, size_t lungs
                         bool volume, double amplitude, uint64_t seed);
 void fixture_destroy(fixture *f);
 
+/* Harmonics of the volumes at rest of two lungs, each 850 mL below the reference surface. */
+extern const double fixture_resting[18];
+
 /* Create two closed lungs that shrink towards their apex, by a factor that depends on gravity. */
 fixture *fixture_create_shrinking(size_t vertices, size_t modes, uint64_t seed);
 

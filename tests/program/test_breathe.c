@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <time.h>
 
+#include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "precompute/precompute.h"
@@ -96,9 +97,7 @@ static double volume_of(const float *xyz, const uint32_t *triangles, size_t coun
         p[c][k] = (double)xyz[3 * (size_t)triangles[3 * t + c] + k] - centre[k];
       }
     }
-    sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
-           p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-           p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
+    sum += supine_triple(p[0], p[1], p[2]);
   }
   return sum / 6000.0;
 }

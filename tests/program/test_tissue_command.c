@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
 /* Test the options of `solve` and `precompute` for tissue: accepted and refused values, warnings,
  * output. */
+#include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "precompute/lungs/phantom.h"
 #include "program/command/list.h"
@@ -193,10 +194,7 @@ TEST(test_precompute_collapsed_lung_volumes_exact) {
               p[c][k] = (double)shapes[s][3 * (size_t)corner[c] + k];
             }
           }
-          measured[s] += (p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
-                          p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-                          p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0])) /
-                         6000.0;
+          measured[s] += supine_triple(p[0], p[1], p[2]) / 6000.0;
         }
       }
       const double stated = posed_lung_volume(basis, lung, weights, scales[lung]);

@@ -34,12 +34,10 @@ static const supine_doubt *prepare(world *w, bool another_day, double *space) {
 }
 
 static int setup(void **state) {
-  static const double resting[18] = {850 * -3.5449077018110318, 0, 0, 0, 0, 0, 0, 0, 0,
-                                     850 * -3.5449077018110318};
   world *w = fixture_allocate(1, sizeof *w);
   fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
   size_t size = 0;
-  f->resting = resting;
+  f->resting = fixture_resting;
   w->bytes = fixture_bytes(f, &size);
   w->fixture = f;
   assert_int_equal(supine_basis_open_memory(w->bytes, size, &w->basis, NULL), SUPINE_OK);

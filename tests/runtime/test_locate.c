@@ -18,13 +18,11 @@ typedef struct world {
 } world;
 
 static int setup(void **state) {
-  static const double resting[18] = {850 * -3.5449077018110318, 0, 0, 0, 0, 0, 0, 0, 0,
-                                     850 * -3.5449077018110318};
   world *w = fixture_allocate(1, sizeof *w);
   fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
   supine_error error = {0};
   size_t size = 0;
-  f->resting = resting;
+  f->resting = fixture_resting;
   w->bytes = fixture_bytes(f, &size);
   fixture_destroy(f);
   if (supine_basis_open_memory(w->bytes, size, &w->basis, &error) != SUPINE_OK) {

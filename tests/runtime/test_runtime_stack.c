@@ -200,10 +200,8 @@ static void expect_small_stack(fixture *f, void (*use)(work *w)) {
 }
 
 TEST(test_all_functions_stated_stack_suffices) {
-  static const double resting[18] = {850 * -3.5449077018110318, 0, 0, 0, 0, 0, 0, 0, 0,
-                                     850 * -3.5449077018110318};
   fixture *f = fixture_create_shrinking(VERTICES, 2, 77);
-  f->resting = resting;
+  f->resting = fixture_resting;
   expect_small_stack(f, use_all);
 }
 
