@@ -41,6 +41,7 @@ def write_inputs():
                         ("small", 0.9)):
         write_ply(name + ".ply", surface * scale, faces[:, ::-1] if name == "mirrored" else faces)
     write_ply("rest.ply", state_of(lungs, STATE), faces)
+    make("fit", "rest.ply", "right.ply", "--rest", STATE, "--other", "supine:full", "-o", "patient.json")
     image = voxels_of(grid)
     sides = image["values"]
     height = np.indices(sides.shape)[0] / len(sides)
@@ -95,6 +96,8 @@ CASES = {
                                 precompute("small.ply", *PERSON, "--scanned", "supine:rest"), {"scanned"}),
     "large at rest": (precompute("right.ply", "--scanned", "supine:rest"), None, set()),
     "rest above full": (precompute("right.ply", "--resting", "supine=7500mL"), None, set()),
+    "fitted in another state": (precompute("rest.ply", "--patient", "patient.json", "--scanned", "supine:full"),
+                                precompute("rest.ply", "--patient", "patient.json"), {"scanned"}),
     "law and scanned": (precompute("right.ply", "--law", "paper", "--scanned", "supine:rest+1000"),
                         precompute("right.ply", "--law", "paper"), {"scanned"}),
     "full": (precompute("right.ply", "--full", "8000mL"), precompute("right.ply"), {"full"}),

@@ -24,7 +24,7 @@ typedef struct gltf {
 } gltf;
 
 /* Parse the text of a file, or of the first chunk of a binary one; NULL if it is malformed. */
-static json_t *parse(const mesh_file *file) {
+static json_t *parse(const mesh_file *file, json_error_t *why) {
   enum { HEADER = 20, CHUNK = 12 };
   const unsigned char *text = file->bytes;
   size_t size = file->size;
@@ -36,7 +36,7 @@ static json_t *parse(const mesh_file *file) {
     }
   }
   SUPINE_C_LOCALE;
-  return json_loadb((const char *)text, size, JSON_DISABLE_EOF_CHECK, NULL);
+  return json_loadb((const char *)text, size, JSON_DISABLE_EOF_CHECK, why);
 }
 
 /* Return a count in an object, `otherwise` if it is missing, or -1 if it is none. */
@@ -138,7 +138,11 @@ static supine_status check_primitive(const gltf *g, const json_t *primitive) {
 
 supine_status supine_io_read_gltf(mesh_file *file, supine_mesh *mesh, size_t *dropped,
                                   supine_error *error) {
-  json_auto_t *root = parse(file);
+  json_error_t why = {0};
+  json_auto_t *root = parse(file, &why);
+  if (root == NULL && json_error_code(&why) == json_error_out_of_memory) {
+    return supine_error_memory(error, "%s", file->path);
+  }
   const gltf g = {file->path, root, error};
   const json_t *meshes = json_object_get(root, "meshes");
   for (size_t i = 0; i < json_array_size(meshes); ++i) {
