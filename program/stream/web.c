@@ -72,7 +72,11 @@ static supine_stream_web *web_of(struct lws *wsi) {
   return lws.context_user(lws.get_context(wsi));
 }
 
-bool supine_stream_web_is_host(const char *host, const char *names) {
+/* Return whether the Host header of a request may name this server: a numeric address, localhost or
+ * one of `names`, with or without a port. Any other name may have been made to point to this
+ * machine by a web site, whose page could then read the answers (DNS rebinding).
+ * @param names  separated by commas, or NULL */
+static bool is_host(const char *host, const char *names) {
   char name[256];
   struct in6_addr address;
   const bool bracketed = host[0] == '[';
@@ -100,7 +104,7 @@ bool supine_stream_web_is_host(const char *host, const char *names) {
 /* Read the Host header of a request; return whether it may name this server. */
 static bool read_host(struct lws *wsi, char *host, size_t size) {
   return lws.hdr_copy(wsi, host, (int)size, WSI_TOKEN_HOST) > 0 &&
-         supine_stream_web_is_host(host, web_of(wsi)->site.names);
+         is_host(host, web_of(wsi)->site.names);
 }
 
 /* Return whether to accept a WebSocket. Its Origin header must name the same host as its Host

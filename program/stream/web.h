@@ -29,12 +29,6 @@ typedef struct supine_stream_site {
   size_t page_size;              /**< bytes */
 } supine_stream_site;
 
-/** Return whether the Host header of a request may name this server: a numeric address, localhost
- * or one of `names`, with or without a port. Any other name may have been made to point to this
- * machine by a web site, whose page could then read the answers (DNS rebinding).
- * @param names  separated by commas, or NULL */
-bool supine_stream_web_is_host(const char *host, const char *names);
-
 /** Start a thread that serves a site. */
 supine_status supine_stream_web_create(supine_stream_site *site, supine_stream_web **web,
                                        supine_error *error);
