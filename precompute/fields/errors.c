@@ -29,7 +29,7 @@
 
 /* Errors of a few directions vary about what (1) expects of them: stated errors are this much
  * larger. Chosen on nine sets of tests/evidence/fields.py: of 90 found errors two are above the
- * stated one then, and three below a third of it. */
+ * stated one then, and two below a third of it. */
 static const double safety = 1.7;
 
 static const double sqrt_4pi = 3.5449077018110321;
