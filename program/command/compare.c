@@ -119,9 +119,7 @@ static supine_status add_pair(const supine_basis *basis, const supine_options_na
   }
   if (in_hilum) {
     SUPINE_TRY(
-        supine_options_hilum_expected(basis, &item[1]->state, &scan, &errors.position, error));
-    SUPINE_TRY(supine_options_hilum_expected(basis, &item[1]->state, &item[0]->state, &errors.moved,
-                                             error));
+        supine_options_hilum_errors(basis, &item[1]->state, &item[0]->state, &errors, error));
   }
   SUPINE_TRY(supine_options_targets_find(basis, names,
                                          (const supine_pose *const[2]){&pose[0], &pose[1]}, &errors,

@@ -97,11 +97,8 @@ static supine_status find_errors(const supine_basis *basis, const request *wante
                                         error));
   }
   if (wanted->frame.hilum) {
-    const supine_state scan = supine_basis_scan(basis);
     SUPINE_TRY(
-        supine_options_hilum_expected(basis, &moved->state, &scan, &errors->position, error));
-    SUPINE_TRY(supine_options_hilum_expected(basis, &moved->state, &moved->from.state,
-                                             &errors->moved, error));
+        supine_options_hilum_errors(basis, &moved->state, &moved->from.state, errors, error));
   }
   if (supine_basis_get_info(basis)->is_fields) {
     SUPINE_TRY(supine_posed_simulator_error(basis, &moved->state, &errors->position, error));

@@ -62,9 +62,9 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_state
   return SUPINE_OK;
 }
 
-supine_status supine_options_hilum_expected(const supine_basis *basis, const supine_state *state,
-                                            const supine_state *from, supine_expected *expected,
-                                            supine_error *error) {
+static supine_status relate(const supine_basis *basis, const supine_state *state,
+                            const supine_state *from, supine_expected *expected,
+                            supine_error *error) {
   supine_expected_model model;
   double mean[SUPINE_EXPECTED_TERMS];
   if (expected->sigma == NULL) {
@@ -78,4 +78,12 @@ supine_status supine_options_hilum_expected(const supine_basis *basis, const sup
   }
   supine_posed_expected_measure(supine_basis_get_info(basis)->vertex_count, expected);
   return SUPINE_OK;
+}
+
+supine_status supine_options_hilum_errors(const supine_basis *basis, const supine_state *state,
+                                          const supine_state *from, supine_errors *errors,
+                                          supine_error *error) {
+  const supine_state scan = supine_basis_scan(basis);
+  SUPINE_TRY(relate(basis, state, &scan, &errors->position, error));
+  return relate(basis, state, from, &errors->moved, error);
 }

@@ -17,11 +17,12 @@ supine_status supine_options_hilum(const supine_basis *basis, const supine_state
                                    const supine_state *from, bool needed, supine_hilum *hilum,
                                    supine_error *error);
 
-/* Replace expected errors in the body by those relative to the hilum, of the difference between the
- * displacement of each vertex and that of the hilum. Do nothing if the errors are unknown.
- * Statuses: as supine_options_hilum if the hilum is needed. */
-supine_status supine_options_hilum_expected(const supine_basis *basis, const supine_state *state,
-                                            const supine_state *from, supine_expected *expected,
-                                            supine_error *error);
+/* Replace expected errors in the body, of positions and of displacements from a state, by those
+ * relative to the hilum: of the difference between the displacement of each vertex and that of the
+ * hilum. Do nothing if the errors are unknown. Statuses: as supine_options_hilum if the hilum is
+ * needed. */
+supine_status supine_options_hilum_errors(const supine_basis *basis, const supine_state *state,
+                                          const supine_state *from, supine_errors *errors,
+                                          supine_error *error);
 
 #endif
