@@ -148,9 +148,11 @@ supine_status supine_report_html(const supine_comparison *c, FILE *file, supine_
   if (pictures == NULL && error->status == SUPINE_ERROR_MEMORY) {
     return error->status;
   }
-  (void)(pictures != NULL ? json_object_set_new(data, "pictures", pictures)
-                          : json_object_set_new(data, "trouble",
-                                                json_string(supine_options_explain(error).text)));
+  if (pictures == NULL) {
+    (void)json_object_set_new(data, "trouble", json_string(supine_options_explain(error).text));
+  } else {
+    (void)json_object_set_new(data, "pictures", pictures);
+  }
   supine_export_template_fill(supine_report_assets, data, "report.html", file);
   return SUPINE_OK;
 }
