@@ -9,8 +9,10 @@
 #include "runtime/location.h"
 
 enum {
-  DOUBT_VECTORS = 4, /* assumed volume, heart, sliding, collapse */
-  DOUBT_BLOCK = 32   /* vertices whose features are evaluated at once */
+  /* A vertex has an error vector for each of: the assumed volume, the weight of the heart, sliding
+   * along the chest wall, and a collapsed lung. */
+  DOUBT_VECTORS = 4,
+  DOUBT_BLOCK = 32 /* vertices whose features are evaluated at once */
 };
 
 struct supine_doubt {

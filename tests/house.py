@@ -131,8 +131,8 @@ def check_include_cycles(files):
             target = os.path.join(used, os.path.basename(name))
             if target in graph and target != file:
                 graph[file].add(target)
-    if in_cycles(graph):
-        faults.append(f"files that include each other in cycles: {in_cycles(graph)}")
+    if cycles := in_cycles(graph):
+        faults.append(f"files that include each other in cycles: {cycles}")
 
 
 def objects():
@@ -177,8 +177,8 @@ def check_names(folders, files):
             if not symbol.startswith((prefix, "__")) and symbol + "_" != prefix:
                 faults.append(f"{file}.c defines {symbol}, which does not begin with {prefix}")
     graph = {file: {home[name] for name in used if name in home} - {file} for file, _, used in listed}
-    if in_cycles(graph):
-        faults.append(f"files that use each other in cycles: {in_cycles(graph)}")
+    if cycles := in_cycles(graph):
+        faults.append(f"files that use each other in cycles: {cycles}")
     if len(listed) < len(folders):
         faults.append(f"only {len(listed)} object files in {build}: build first")
 

@@ -222,9 +222,9 @@ static void check_belonging(const embedding *e, supine_findings *findings) {
     }
     char text[96] = "vertices of ";
     add_name(content->names, content->part[begin], text, sizeof text);
-    taken = supine_lungs_belong_judge(&part, SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis",
-                                      findings) == SUPINE_INPUT_TAKEN &&
-            taken;
+    const supine_input_verdict verdict =
+        supine_lungs_belong_judge(&part, SUPINE_INPUT_CONTENT_OUTSIDE, text, "basis", findings);
+    taken = taken && verdict == SUPINE_INPUT_TAKEN;
   }
   (void)supine_lungs_belong_judge(&points, SUPINE_INPUT_CONTENT_OUTSIDE, "points", "basis",
                                   findings);

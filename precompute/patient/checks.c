@@ -20,7 +20,7 @@ enum { GROUPS = 20, NEIGHBOURS = 8, PAIRS_LEAST = 30, NAMED_MOST = 12 };
 
 /* A coarse surface cuts corners off the lungs, up to about this share of its edge length. */
 static const double cut = 0.8;
-/* Directions of gravity that differ by more are of different postures. */
+/* Two postures are different if their unit vectors of gravity are farther apart than this. */
 static const double same_posture = 0.05;
 static const double growth_least = 0.02; /* smaller changes of ln(volume) are none */
 static const double dropped_most = 0.2;  /* largest share of the pairs that are dropped */

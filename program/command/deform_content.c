@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: GPL-3.0-or-later */
-/* Choose and check what 'supine deform' writes, and print the errors and the frame of it. */
+/* Read and check the options on what 'supine deform' writes; write it, and print its expected
+ * errors and its frame. */
 #include <math.h>
 
 #include "base/number.h"

@@ -85,9 +85,9 @@ supine_status supine_command_deform_images(const supine_deform_content *wanted,
                                            const supine_basis *basis,
                                            const supine_deformation *moved, supine_error *error);
 
-/* Write the ventilation between the states of a field to wanted->ventilation, on the voxels of the
- * image or else of the labels. Print the sums over the lungs beside what their surfaces take in,
- * and those over the labels. */
+/* Write the file of --ventilation: the air that each voxel of the image, or else of the label map,
+ * takes in between the two states that the field joins. Print what each lung takes in by the voxels
+ * and by its surface, and what each label takes in. */
 supine_status supine_command_deform_ventilation(const supine_deform_content *wanted,
                                                 const supine_basis *basis,
                                                 const supine_deformation *moved,

@@ -161,8 +161,8 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   const supine_basis_info *info = supine_basis_get_info(basis);
   static const double told = 0.01;
   static const double allowed = 0.1;
-  SUPINE_TRY(supine_warp_between(basis, moved->from_given ? &moved->from.pose : NULL, &moved->pose,
-                                 moved->deviation, field, error));
+  const supine_pose *from = moved->from_given ? &moved->from.pose : NULL;
+  SUPINE_TRY(supine_warp_between(basis, from, &moved->pose, moved->deviation, field, error));
   double folded[2];
   supine_warp_folded(field, folded);
   const double around = folded[1];
@@ -182,23 +182,18 @@ static supine_status find_field(const supine_basis *basis, const supine_deformat
   return supine_options_plausible(&lungs, error);
 }
 
-/* Check that the image and the labels to move show the lungs of the field. */
+/* Check that the image and the label map show the lungs that the field moves. */
 static supine_status check_images(const supine_deform_content *wanted, const supine_field *field,
                                   supine_error *error) {
-  const struct {
-    const char *path;
-    const supine_image *image;
-    supine_warp_image_kind kind;
-  } images[] = {
-      {wanted->image, &wanted->source, wanted->density ? SUPINE_FIELD_CT : SUPINE_FIELD_IMAGE},
-      {wanted->labels, &wanted->label_source, SUPINE_FIELD_LABELS}};
+  const supine_warp_image_kind kind = wanted->density ? SUPINE_FIELD_CT : SUPINE_FIELD_IMAGE;
   supine_findings findings = {.count = 0};
   supine_status status = SUPINE_OK;
-  for (size_t i = 0; i < sizeof images / sizeof *images && status == SUPINE_OK; ++i) {
-    if (images[i].path != NULL) {
-      status = supine_warp_check_image(field, images[i].image, images[i].path, images[i].kind,
-                                       &findings, error);
-    }
+  if (wanted->image != NULL) {
+    status = supine_warp_check_image(field, &wanted->source, wanted->image, kind, &findings, error);
+  }
+  if (status == SUPINE_OK && wanted->labels != NULL) {
+    status = supine_warp_check_image(field, &wanted->label_source, wanted->labels,
+                                     SUPINE_FIELD_LABELS, &findings, error);
   }
   supine_options_say_findings("deform", &findings);
   return status;
@@ -232,8 +227,8 @@ supine_status supine_command_deform_images(const supine_deform_content *wanted,
                            wanted->density ? &wanted->tissue->soft : NULL, &inverse, error));
   }
   if (labels) {
-    SUPINE_TRY(write_image(image ? wanted->labels_path : wanted->path, &wanted->label_source, true,
-                           NULL, &inverse, error));
+    const char *path = image ? wanted->labels_path : wanted->path;
+    SUPINE_TRY(write_image(path, &wanted->label_source, true, NULL, &inverse, error));
   }
   return SUPINE_OK;
 }

@@ -302,6 +302,17 @@ static void clock_samples(const supine_basis *basis, const supine_state *state, 
   free(more);
 }
 
+/* Open the basis of a fixture, and free the fixture. Return the bytes of the file, which the caller
+ * frees after the basis. */
+static unsigned char *open_fixture(fixture *f, supine_basis **basis) {
+  size_t size = 0;
+  supine_error error;
+  unsigned char *bytes = fixture_bytes(f, &size);
+  fixture_destroy(f);
+  need(supine_basis_open_memory(bytes, size, basis, &error), &error);
+  return bytes;
+}
+
 /* Time the covariances of points inside lungs whose law was fitted to landmarks, against preparing
  * the field. */
 static void clock_covariance(void) {
@@ -326,12 +337,9 @@ static void clock_covariance(void) {
   f->error_share = share;
   f->landmarks = landmarks;
   f->landmark_count = LANDMARKS;
-  size_t size = 0;
-  unsigned char *bytes = fixture_bytes(f, &size);
-  fixture_destroy(f);
   supine_basis *basis = NULL;
   supine_error error;
-  need(supine_basis_open_memory(bytes, size, &basis, &error), &error);
+  unsigned char *bytes = open_fixture(f, &basis);
   const supine_state state = {.gravity = {1, 0, 0}, .volume = {SUPINE_VOLUME_REST, 300}};
   const supine_doubt_task task = {.basis = basis, .state_count = 1, .states = &state};
   double *space = malloc(supine_doubt_space(basis, 1) * sizeof *space);
@@ -359,12 +367,9 @@ static void clock_library(void) {
   static float sigma[VERTICES];
   fixture *f = fixture_create_shrinking(VERTICES, MODES, 5);
   f->resting = fixture_resting;
-  size_t size = 0;
-  unsigned char *bytes = fixture_bytes(f, &size);
-  fixture_destroy(f);
   supine_basis *basis = NULL;
   supine_error error;
-  need(supine_basis_open_memory(bytes, size, &basis, &error), &error);
+  unsigned char *bytes = open_fixture(f, &basis);
   supine_state state = {.gravity = {1, 0, 0}, .volume = {SUPINE_VOLUME_REST, 300}};
   supine_pose pose;
   need(supine_basis_pose(basis, &state, &pose, &error), &error);

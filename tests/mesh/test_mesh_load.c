@@ -211,6 +211,21 @@ TEST(test_load_more_than_counted_refused) {
   refuse_text(state, "more.ac", AC("1"), SUPINE_ERROR_FORMAT, "it counts 1 surfaces");
 }
 
+/* A text of a surface whose second vertex is 2 units along y, and the unit in mm. */
+typedef struct text_in_unit {
+  const char *text;
+  double millimetres;
+} text_in_unit;
+
+static void expect_units(void **state, const char *name, const text_in_unit *files, size_t count) {
+  char path[256];
+  for (size_t i = 0; i < count; ++i) {
+    supine_mesh mesh = load(sample_text(state, name, files[i].text, path), NULL, NULL);
+    assert_true(fabs(mesh.vertices[4] - 2.0 * files[i].millimetres) < 1e-12);
+    supine_mesh_free(&mesh);
+  }
+}
+
 #define AMF(unit)                                                                                  \
   "<?xml version=\"1.0\"?>\n<amf" unit " version=\"1.1\"><object id=\"0\"><mesh><vertices>"        \
   "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"                           \
@@ -219,22 +234,16 @@ TEST(test_load_more_than_counted_refused) {
   "<triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>\n"
 
 TEST(test_load_amf_unit_of_the_file_used) {
-  static const struct {
-    const char *text;
-    double millimetres;
-  } files[] = {{AMF(""), 1.0},
-               {AMF(" unit=\"millimeter\""), 1.0},
-               {AMF(" unit='inch'"), 25.4},
-               {AMF(" unit=\"feet\""), 304.8},
-               {AMF(" unit=\"meter\""), 1000.0},
-               {AMF(" unit=\"micron\""), 0.001},
-               {"<!-- <amf unit=\"meter\"> -->" AMF("\n  unit = 'inch'"), 25.4}};
+  static const text_in_unit files[] = {
+      {AMF(""), 1.0},
+      {AMF(" unit=\"millimeter\""), 1.0},
+      {AMF(" unit='inch'"), 25.4},
+      {AMF(" unit=\"feet\""), 304.8},
+      {AMF(" unit=\"meter\""), 1000.0},
+      {AMF(" unit=\"micron\""), 0.001},
+      {"<!-- <amf unit=\"meter\"> -->" AMF("\n  unit = 'inch'"), 25.4}};
   char path[256];
-  for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
-    supine_mesh mesh = load(sample_text(state, "u.amf", files[i].text, path), NULL, NULL);
-    assert_true(fabs(mesh.vertices[4] - 2.0 * files[i].millimetres) < 1e-12);
-    supine_mesh_free(&mesh);
-  }
+  expect_units(state, "u.amf", files, sizeof files / sizeof *files);
   const supine_mesh_load_options cm = {.millimetres_per_unit = 10.0}; /* replaces the file's unit */
   supine_mesh mesh = load(sample_text(state, "u.amf", AMF(" unit=\"inch\""), path), &cm, NULL);
   assert_true(mesh.vertices[4] == 20.0);
@@ -247,21 +256,14 @@ TEST(test_load_amf_unit_of_the_file_used) {
   "-1\"><Coordinate point=\"1 0 0 0 2 0 0 0 3\"/></IndexedFaceSet></Shape></Scene></X3D>"
 
 TEST(test_load_x3d_unit_of_length_used) {
-  static const struct {
-    const char *text;
-    double millimetres;
-  } files[] = {{X3D(""), 1.0},
-               {X3D("<unit category=\"length\" conversionFactor=\"0.01\" name=\"cm\"/>"), 10.0},
-               {X3D("<unit category='angle' conversionFactor='2' name='a'/>"
-                    "<unit category='length' conversionFactor='0.001' name='mm'/>"),
-                1.0},
-               {X3D("<unit category='mass' conversionFactor='0.001' name='g'/>"), 1.0}};
-  char path[256];
-  for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
-    supine_mesh mesh = load(sample_text(state, "u.x3d", files[i].text, path), NULL, NULL);
-    assert_true(fabs(mesh.vertices[4] - 2.0 * files[i].millimetres) < 1e-12);
-    supine_mesh_free(&mesh);
-  }
+  static const text_in_unit files[] = {
+      {X3D(""), 1.0},
+      {X3D("<unit category=\"length\" conversionFactor=\"0.01\" name=\"cm\"/>"), 10.0},
+      {X3D("<unit category='angle' conversionFactor='2' name='a'/>"
+           "<unit category='length' conversionFactor='0.001' name='mm'/>"),
+       1.0},
+      {X3D("<unit category='mass' conversionFactor='0.001' name='g'/>"), 1.0}};
+  expect_units(state, "u.x3d", files, sizeof files / sizeof *files);
 }
 
 TEST(test_load_legacy_vtk_conversion_named) {
