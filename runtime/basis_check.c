@@ -74,7 +74,10 @@ supine_status supine_check_read(const supine_check *c, const char *key, size_t c
                                 double *values) {
   const char *const text = supine_safetensors_metadata(c->file, key);
   const char *at = text;
-  for (size_t i = 0; at != NULL && i < count; ++i) {
+  if (text == NULL) {
+    return SUPINE_OK;
+  }
+  for (size_t i = 0; i < count; ++i) {
     char *end = NULL;
     values[i] = supine_number_parse(at, &end);
     if (end == at || *end != (i + 1 < count ? ',' : '\0') || !isfinite(values[i])) {

@@ -23,6 +23,16 @@ static supine_status check_normals(const supine_check *c, supine_basis *basis) {
   return SUPINE_OK;
 }
 
+static bool is_in_one_lung(const supine_basis *basis, const uint32_t range[2]) {
+  for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
+    if (range[0] >= basis->lung_begin[lung] && range[0] < range[1] &&
+        range[1] <= basis->lung_begin[lung + 1]) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Check the optional tensor 'rigid'. Each row must be a range of vertices of one lung. */
 static supine_status check_rigid(const supine_check *c, supine_basis *basis) {
   const supine_tensor *rigid = supine_safetensors_find(c->file, "rigid");
@@ -30,13 +40,9 @@ static supine_status check_rigid(const supine_check *c, supine_basis *basis) {
     return SUPINE_OK;
   }
   bool well = rigid->dtype == SUPINE_U32 && rigid->rank == 2 && rigid->shape[1] == 2;
-  for (size_t i = 0; well && i < rigid->shape[0]; ++i) {
-    const uint32_t *range = (const uint32_t *)rigid->data + 2 * i;
-    well = false;
-    for (size_t lung = 0; lung < basis->info.lung_count; ++lung) {
-      well = well || (range[0] >= basis->lung_begin[lung] && range[0] < range[1] &&
-                      range[1] <= basis->lung_begin[lung + 1]);
-    }
+  const size_t rows = well ? rigid->shape[0] : 0;
+  for (size_t i = 0; i < rows; ++i) {
+    well = well && is_in_one_lung(basis, (const uint32_t *)rigid->data + 2 * i);
   }
   if (!well) {
     return supine_check_refuse(

@@ -35,25 +35,19 @@ static supine_status check_volume(const supine_check *c, supine_basis *basis) {
 /* For each lung, add the volume that the reference surface encloses, mL, to `reference_volume`. */
 static void measure_lungs(supine_basis *basis) {
   const supine_basis_info *info = &basis->info;
-  for (size_t t = 0; t < info->triangle_count;) {
+  for (size_t t = 0; t < info->triangle_count; ++t) {
     const size_t lung = supine_basis_lung_of(info, info->triangles[3 * t]);
     const float *origin = info->vertices + 3 * info->lung_begin[lung];
-    double volume = basis->reference_volume[lung];
-    for (; t < info->triangle_count && info->triangles[3 * t] >= info->lung_begin[lung] &&
-           info->triangles[3 * t] < info->lung_begin[lung + 1];
-         ++t) {
-      double p[3][3];
-      for (size_t i = 0; i < 9; ++i) {
-        const size_t corner = info->triangles[3 * t + i / 3];
-        p[i / 3][i % 3] = (double)info->vertices[3 * corner + i % 3] - (double)origin[i % 3];
-      }
-      for (size_t i = 0; i < 3; ++i) {
-        const size_t j = (i + 1) % 3;
-        const size_t k = (i + 2) % 3;
-        volume += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
-      }
+    double p[3][3];
+    for (size_t i = 0; i < 9; ++i) {
+      const size_t corner = info->triangles[3 * t + i / 3];
+      p[i / 3][i % 3] = (double)info->vertices[3 * corner + i % 3] - (double)origin[i % 3];
     }
-    basis->reference_volume[lung] = volume;
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t j = (i + 1) % 3;
+      const size_t k = (i + 2) % 3;
+      basis->reference_volume[lung] += 1e-3 / 6 * p[0][i] * (p[1][j] * p[2][k] - p[1][k] * p[2][j]);
+    }
   }
 }
 

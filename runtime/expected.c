@@ -509,10 +509,7 @@ double supine_expected_along(size_t band, const double *harmonics, const double 
   }
   (void)supine_sh_evaluate(band + 1, gravity, y); /* fails for no vector that has a direction */
   for (size_t row = 0; row < 2 * band + 4; ++row) {
-    double part = 0;
-    for (size_t t = 0; t < count; ++t) {
-      part += harmonics[row * count + t] * y[t];
-    }
+    const double part = supine_dot_n(count, harmonics + row * count, y);
     square += (row == 0 ? 1 : factor) * part * part;
   }
   return sqrt(square);
